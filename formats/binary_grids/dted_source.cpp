@@ -194,7 +194,6 @@ class DtedSource final : public FileSource {
     const std::string_view vertical = field(kUhlBytes + 141, 3);
     if (vertical == "E96") {
       system.vertical_datum = "EGM96";
-      system.vertical_epsg = 5773;
     } else if (vertical == "MSL") {
       system.vertical_datum = "mean sea level";
     }

@@ -134,7 +134,6 @@ class HgtSource final : public PlainSource {
     geo.spacing_x = 1.0 / static_cast<double>(size->columns - 1);
     geo.spacing_y = 1.0 / static_cast<double>(size->rows - 1);
     geo.system = wgs84_system();
-    geo.system.vertical_epsg = 5773;
     geo.system.vertical_datum = "EGM96";
     if (const std::optional<HgtCorner> corner = hgt_corner_of(name)) {
       geo.has_origin = true;

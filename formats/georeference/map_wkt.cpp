@@ -68,6 +68,10 @@ std::string quoted(std::string name) {
 
 }  // namespace
 
+const char* meridian_of(double semi_major_axis_m) {
+  return std::abs(semi_major_axis_m / 6378137.0 - 1.0) < 0.01 ? "Greenwich" : "Reference_Meridian";
+}
+
 std::string_view method_of_code(int code) {
   const auto* const found = std::ranges::find(kMethods, code, &Method::code);
   return code == 0 || found == kMethods.end() ? std::string_view() : found->name;
@@ -77,7 +81,11 @@ std::string map_wkt(const std::string& name, const std::string& geographic, std:
                     const MapParameters& parameters, double metres_per_unit) {
   const auto* const found = std::ranges::find(kMethods, method, &Method::name);
   if (found == kMethods.end()) return {};
-  std::string text = fmt::format("PROJCS[{},{},PROJECTION[\"{}\"]", quoted(name), geographic, method);
+  // Where WKT 1 has one name for two methods of EPSG's: labels and keys mean the first, as GDAL reads them.
+  const char* const code = method == "Equirectangular"       ? R"(,AUTHORITY["EPSG","1028"])"
+                           : method == "Polar_Stereographic" ? R"(,AUTHORITY["EPSG","9810"])"
+                                                             : "";
+  std::string text = fmt::format("PROJCS[{},{},PROJECTION[\"{}\"{}]", quoted(name), geographic, method, code);
   const auto add = [&](const char* what, double value) { text += fmt::format(",PARAMETER[\"{}\",{}]", what, value); };
   if (found->latitude != nullptr) add(found->latitude, parameters.latitude);
   add(found->longitude, parameters.longitude);
@@ -96,10 +104,12 @@ std::string map_wkt(const std::string& name, const std::string& geographic, std:
 }
 
 std::string geographic_wkt(const std::string& name, const std::string& datum, const std::string& ellipsoid,
-                           double semi_major_axis_m, double inverse_flattening, double degrees_per_unit) {
+                           double semi_major_axis_m, double inverse_flattening, const std::string& meridian,
+                           double degrees_per_unit) {
   const bool is_degree = degrees_per_unit == 1.0;
-  return fmt::format("GEOGCS[{},DATUM[{},SPHEROID[{},{},{}]],PRIMEM[\"Greenwich\",0],UNIT[\"{}\",{}]]", quoted(name),
-                     quoted(datum), quoted(ellipsoid), semi_major_axis_m, inverse_flattening,
+  const std::string from = meridian.empty() ? meridian_of(semi_major_axis_m) : meridian;
+  return fmt::format("GEOGCS[{},DATUM[{},SPHEROID[{},{},{}]],PRIMEM[{},0],UNIT[\"{}\",{}]]", quoted(name),
+                     quoted(datum), quoted(ellipsoid), semi_major_axis_m, inverse_flattening, quoted(from),
                      is_degree ? "degree" : "angle",
                      is_degree ? 0.0174532925199433 : degrees_per_unit * std::numbers::pi / 180.0);
 }
@@ -152,7 +162,7 @@ std::string planetary_wkt(const PlanetaryMap& map) {
   }
   const bool on_sphere = is_cylinder || !map.planetographic || a == c;
   const std::string beneath = geographic_wkt("GCS_" + map.target, "D_" + map.target, map.target, on_sphere ? radius : a,
-                                             on_sphere ? 0.0 : a / (a - c));
+                                             on_sphere ? 0.0 : a / (a - c), "Reference_Meridian");
   if (known->method.empty()) return beneath;
   const bool is_secant = known->method == "Mercator_1SP" && parameters.parallel_1 != 0.0;
   return map_wkt(map.projection + ' ' + map.target, beneath, is_secant ? "Mercator_2SP" : known->method, parameters,

@@ -27,10 +27,14 @@ struct MapParameters {
 [[nodiscard]] std::string map_wkt(const std::string& name, const std::string& geographic, std::string_view method,
                                   const MapParameters& parameters, double metres_per_unit);
 
-/// A geographic system on an ellipsoid (inverse flattening 0: a sphere), from Greenwich or what the body has for it.
+/// What PROJ and GDAL call the meridian that longitudes are counted from on a body of this size.
+[[nodiscard]] const char* meridian_of(double semi_major_axis_m);
+
+/// A geographic system on an ellipsoid (inverse flattening 0: a sphere). `meridian` empty: meridian_of().
 [[nodiscard]] std::string geographic_wkt(const std::string& name, const std::string& datum,
                                          const std::string& ellipsoid, double semi_major_axis_m,
-                                         double inverse_flattening, double degrees_per_unit = 1.0);
+                                         double inverse_flattening, const std::string& meridian = {},
+                                         double degrees_per_unit = 1.0);
 
 /// A map of a planet or moon, as its agencies' labels describe it.
 struct PlanetaryMap {

@@ -105,6 +105,11 @@ double world_per_elevation(const Metadata& metadata) {
   return unit ? unit->metres : 1.0;
 }
 
+std::string gdal_unit(const std::string& name, bool has_vertical_code) {
+  const bool is_short = !has_vertical_code && (name == "metre" || name == "foot");
+  return is_short ? (name == "metre" ? "m" : "ft") : name;
+}
+
 ReferenceSystem wgs84_system() {
   ReferenceSystem system;
   system.name = "WGS 84";

@@ -28,6 +28,10 @@ struct LinearUnit {
 /// World units of one elevation unit of an archive, whose degrees are drawn as metres; 1 where either is not known.
 [[nodiscard]] double world_per_elevation(const Metadata& metadata);
 
+/// What GDAL calls the unit of a band's heights that linear_unit() has named: "m", "ft", else the name; where a code says what
+/// heights are above, by that system's.
+[[nodiscard]] std::string gdal_unit(const std::string& name, bool has_vertical_code);
+
 /// WGS 84 in degrees, on the Earth.
 [[nodiscard]] ReferenceSystem wgs84_system();
 /// A zone of UTM on it, 1 to 60.

@@ -247,8 +247,38 @@ DatumNames datum_names(std::string_view wkt) {
     const Node* const node = root->below(words);
     return node == nullptr || node->texts.empty() ? std::string() : node->texts[0];
   };
-  return {name({"DATUM", "GEODETICDATUM", "TRF", "ENSEMBLE"}), name({"SPHEROID", "ELLIPSOID"}),
+  return {name({"GEOGCS", "GEOGCRS", "BASEGEOGCRS", "BASEGEODCRS", "GEODCRS"}),
+          name({"DATUM", "GEODETICDATUM", "TRF", "ENSEMBLE"}), name({"SPHEROID", "ELLIPSOID"}),
           name({"PRIMEM", "PRIMEMERIDIAN"})};
+}
+
+std::optional<KeyedMap> keyed_map(std::string_view wkt) {
+  const std::optional<Node> root = Parser(wkt).whole();
+  const Node* const method = root ? root->below({"PROJECTION", "METHOD"}) : nullptr;
+  const Node* const ellipsoid = root ? root->below({"SPHEROID", "ELLIPSOID"}) : nullptr;
+  const int code = method == nullptr ? 0 : epsg_of(*method).value_or(0);
+  if ((code != 1028 && code != 9810) || ellipsoid == nullptr || ellipsoid->numbers.size() < 2) return std::nullopt;
+  KeyedMap map{code, datum_names(wkt), ellipsoid->numbers[0], ellipsoid->numbers[1], {}};
+  MapParameters& found = map.parameters;
+  const std::map<std::string, double*> names = {{"standard_parallel_1", &found.parallel_1},
+                                                {"latitude of 1st standard parallel", &found.parallel_1},
+                                                {"central_meridian", &found.longitude},
+                                                {"longitude of natural origin", &found.longitude},
+                                                {"latitude_of_origin", &found.latitude},
+                                                {"latitude of natural origin", &found.latitude},
+                                                {"scale_factor", &found.scale},
+                                                {"scale factor at natural origin", &found.scale},
+                                                {"false_easting", &found.easting},
+                                                {"false easting", &found.easting},
+                                                {"false_northing", &found.northing},
+                                                {"false northing", &found.northing}};
+  const Node* const conversion = root->below({"CONVERSION"});
+  for (const Node& node : (conversion != nullptr ? conversion : root->below({"PROJCS"}))->children) {
+    if (!node.is({"PARAMETER"}) || node.texts.empty() || node.numbers.empty()) continue;
+    if (const auto known = names.find(lower_case(node.texts[0])); known != names.end())
+      *known->second = node.numbers[0];
+  }
+  return map;
 }
 
 namespace {

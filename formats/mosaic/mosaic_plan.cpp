@@ -111,6 +111,15 @@ class Agreement {
 void agree_on_heights(ReferenceSystem& ours, const ReferenceSystem& other, Agreement& agreement) {
   agreement.same(ours.body, other.body, "body");
   agreement.same(ours.vertical_epsg, other.vertical_epsg, "vertical EPSG code");
+  // A .hgt, DTED or USGS DEM names what its heights are above, by no code.
+  const auto contradicts = [](const ReferenceSystem& one, const ReferenceSystem& two) {
+    const bool is_name = one.vertical_datum == "EGM96" || one.vertical_datum == "NAVD88";
+    return is_name && !one.vertical_epsg && !two.vertical_datum.empty() &&
+           two.vertical_datum.find(one.vertical_datum) == std::string::npos;
+  };
+  if (contradicts(ours, other) || contradicts(other, ours)) {
+    agreement.differ("vertical datum", other.vertical_datum, ours.vertical_datum);
+  }
 }
 
 void agree_on_system(ReferenceSystem& ours, const ReferenceSystem& other, Agreement& agreement) {

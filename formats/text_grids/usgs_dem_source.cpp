@@ -193,7 +193,6 @@ void UsgsDemHeader::read_system(SourceInfo& info) const {
   }
   const std::int64_t vertical = whole_number(field(889, 2)).value_or(0);
   system.vertical_datum = vertical == 1 ? "mean sea level" : vertical == 2 ? "NGVD29" : vertical == 3 ? "NAVD88" : "";
-  if (vertical == 3 && info.vertical_unit == "metre") system.vertical_epsg = 5703;
 }
 
 constexpr std::size_t kProfileHeadBytes = 144;

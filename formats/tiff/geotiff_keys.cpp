@@ -418,7 +418,7 @@ std::string geographic_beneath(Keys& keys, const ReferenceSystem& system, double
   };
   return geographic_wkt(named("GCS Name", citation.empty() ? "unknown" : citation.substr(0, citation.find('|'))),
                         named("Datum", "unknown"), named("Ellipsoid", "unknown"), *system.semi_major_axis_m,
-                        system.inverse_flattening.value_or(0.0), degrees);
+                        system.inverse_flattening.value_or(0.0), named("Primem", ""), degrees);
 }
 
 /// The map that keys spell out instead of naming it by a code, as WKT 1; empty, with a warning, where its method is not
@@ -588,6 +588,47 @@ void write_linear_unit(double metres, KeyWriter& keys) {
   keys.real(kLinearUnitSize, metres);
 }
 
+void write_ellipsoid(double semi_major_axis_m, double inverse_flattening, KeyWriter& keys) {
+  keys.real(kSemiMajorAxis, semi_major_axis_m);
+  if (inverse_flattening == 0.0) {  // a sphere has none
+    keys.real(kSemiMinorAxis, semi_major_axis_m);
+  } else {
+    keys.real(kInverseFlattening, inverse_flattening);
+  }
+}
+
+/// Longitudes and latitudes without a code, as GDAL writes and reads them.
+void write_datum(const std::string& name, const DatumNames& names, double semi_major_axis_m, KeyWriter& keys) {
+  keys.number(kAngularUnits, kDegree);
+  if (names.datum.empty()) return keys.text(kGeodeticCitation, name);
+  keys.text(kGeodeticCitation,
+            {"GCS Name = " + name, "Datum = " + names.datum,
+             "Ellipsoid = " + (names.ellipsoid.empty() ? "unknown" : names.ellipsoid),
+             "Primem = " + (names.meridian.empty() ? meridian_of(semi_major_axis_m) : names.meridian)});
+}
+
+void write_keyed_map(const Georeference& geo, const KeyedMap& map, KeyWriter& keys) {
+  keys.number(kModelType, kModelProjected);
+  for (const Key key : {kGeodeticCrs, kDatum, kEllipsoid, kProjectedCrs, kProjection}) keys.number(key, kUserDefined);
+  keys.text(kCitation, geo.system.name);
+  write_datum(map.names.geographic, map.names, map.semi_major_axis_m, keys);
+  write_ellipsoid(map.semi_major_axis_m, map.inverse_flattening, keys);
+  write_linear_unit(geo.metres_per_unit, keys);
+  keys.real(kFalseEasting, map.parameters.easting);
+  keys.real(kFalseNorthing, map.parameters.northing);
+  if (map.method == 9810) {
+    keys.number(kMethod, 15);  // CT_PolarStereographic
+    keys.real(kNaturalLatitude, map.parameters.latitude);
+    keys.real(kNaturalScale, map.parameters.scale);
+    keys.real(kVerticalLongitude, map.parameters.longitude);
+  } else {
+    keys.number(kMethod, 17);  // CT_Equirectangular
+    keys.real(kParallel1, map.parameters.parallel_1);
+    keys.real(kCentreLatitude, map.parameters.latitude);
+    keys.real(kCentreLongitude, map.parameters.longitude);
+  }
+}
+
 /// A system by its code, or, of degrees, by its ellipsoid.
 void write_system(const Georeference& geo, KeyWriter& keys) {
   const ReferenceSystem& system = geo.system;
@@ -598,25 +639,16 @@ void write_system(const Georeference& geo, KeyWriter& keys) {
   if (projected) {
     write_linear_unit(geo.metres_per_unit, keys);
   } else {
-    keys.number(kAngularUnits, kDegree);
-    const auto [datum, ellipsoid, meridian] = system.epsg ? DatumNames{} : datum_names(system.wkt);
-    if (datum.empty()) {
-      keys.text(kGeodeticCitation, system.name);
-    } else {  // as GDAL writes and reads it
-      keys.text(kGeodeticCitation, {"GCS Name = " + system.name, "Datum = " + datum,
-                                    "Ellipsoid = " + (ellipsoid.empty() ? "unknown" : ellipsoid),
-                                    "Primem = " + (meridian.empty() ? "Greenwich" : meridian)});
-    }
+    // ESRI's names, "D_...", GDAL knows in WKT alone.
+    const bool is_esri = !system.epsg && datum_names(system.wkt).datum.starts_with("D_");
+    write_datum(system.name,
+                system.epsg ? DatumNames{} : datum_names(is_esri ? wkt_of(system, WktDialect::kGdal) : system.wkt),
+                system.semi_major_axis_m.value_or(6378137.0), keys);
   }
   if (!system.semi_major_axis_m) return;
   if (projected && !system.epsg) keys.number(kGeodeticCrs, kUserDefined);
+  if (system.inverse_flattening) return write_ellipsoid(*system.semi_major_axis_m, *system.inverse_flattening, keys);
   keys.real(kSemiMajorAxis, *system.semi_major_axis_m);
-  if (!system.inverse_flattening) return;
-  if (*system.inverse_flattening == 0.0) {  // a sphere has no inverse flattening
-    keys.real(kSemiMinorAxis, *system.semi_major_axis_m);
-  } else {
-    keys.real(kInverseFlattening, *system.inverse_flattening);
-  }
 }
 
 /// A map without a code, in the way that ArcGIS and GDAL have for what keys cannot say: user-defined, and its WKT.
@@ -644,7 +676,8 @@ void write_vertical(const ReferenceSystem& system, double metres_per_unit, const
   // What a code of three coordinates says already GDAL would take for a system of heights of its own.
   const bool is_said = system.epsg && system.vertical_datum == kAboveEllipsoid;
   if (!is_said) keys.text(kVerticalCitation, system.vertical_datum);
-  if (unit.empty()) return;
+  // A unit alone GDAL would take for a system of heights.
+  if (unit.empty() || (!system.vertical_epsg && system.vertical_datum.empty())) return;
   if (const auto code = linear_unit_code(metres_per_unit)) keys.number(kVerticalUnits, *code);
 }
 
@@ -708,7 +741,11 @@ GeoTags geotiff_tags(const Georeference& georeference, double metres_per_vertica
   keys.number(kRasterType, georeference.registration == Registration::kPoint ? kRasterIsPoint : kRasterIsArea);
   const bool by_wkt =
       georeference.unit == HorizontalUnit::kMetre && !georeference.system.epsg && !georeference.system.wkt.empty();
-  if (by_wkt) {
+  const std::optional<KeyedMap> keyed =
+      by_wkt && !georeference.system.vertical_epsg ? keyed_map(georeference.system.wkt) : std::nullopt;
+  if (keyed) {
+    write_keyed_map(georeference, *keyed, keys);
+  } else if (by_wkt) {
     write_wkt(georeference, citation_wkt(georeference.system), keys);
   } else if (has_unit) {
     write_system(georeference, keys);

@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "formats/georeference/units.h"
 #include "formats/tiff/gdal_tags.h"
 #include "formats/tiff/geotiff_keys.h"
 #include "formats/write/encoders.h"
@@ -134,7 +135,9 @@ std::string gdal_metadata(const RasterSpec& spec) {
   }
   if (!spec.vertical_unit.empty()) {
     std::string unit;
-    for (const char c : spec.vertical_unit) unit += c == '<' ? "&lt;" : c == '&' ? "&amp;" : std::string(1, c);
+    const bool has_code = spec.georeference && spec.georeference->system.vertical_epsg;
+    for (const char c : gdal_unit(spec.vertical_unit, has_code))
+      unit += c == '<' ? "&lt;" : c == '&' ? "&amp;" : std::string(1, c);
     items += fmt::format("  <Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">{}</Item>\n", unit);
   }
   return items.empty() ? items : "<GDALMetadata>\n" + items + "</GDALMetadata>\n";

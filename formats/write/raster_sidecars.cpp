@@ -12,6 +12,7 @@
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/reference_system.h"
+#include "formats/georeference/units.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
 
@@ -95,7 +96,10 @@ std::string auxiliary_text(const RasterSpec& spec) {
   if (spec.channels == 1) {
     text += "  <PAMRasterBand band=\"1\">\n";
     if (spec.void_value) text += fmt::format("    <NoDataValue>{}</NoDataValue>\n", *spec.void_value);
-    if (!spec.vertical_unit.empty()) text += fmt::format("    <UnitType>{}</UnitType>\n", xml_text(spec.vertical_unit));
+    if (!spec.vertical_unit.empty()) {
+      text += fmt::format("    <UnitType>{}</UnitType>\n",
+                          xml_text(gdal_unit(spec.vertical_unit, place.system.vertical_epsg.has_value())));
+    }
     if (spec.z_scale != 1.0 || spec.z_offset != 0.0) {
       text += fmt::format("    <Offset>{}</Offset>\n    <Scale>{}</Scale>\n", spec.z_offset, spec.z_scale);
     }

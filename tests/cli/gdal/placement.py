@@ -407,6 +407,54 @@ def geojp2(isohf, folder):
         check(numpy.array_equal(gdal.Open(str(folder / "s.tif")).ReadAsArray(), theirs), f"signed JPEG 2000, {options}: samples differ")
 
 
+def same_for_gdal(isohf, folder):
+    """What GDAL reads of an export is the very system that it reads of the source: names, meridian and method; and its unit."""
+    for text in ("+proj=eqc +lat_ts=0 +lon_0=180 +R=3396190", "+proj=eqc +lat_ts=20 +lon_0=30 +R=1737400", "IAU_2015:49910", "IAU_2015:30100",
+                 "+proj=stere +lat_0=-90 +lon_0=0 +R=1737400", "+proj=stere +lat_0=90 +lon_0=30 +a=3396190 +b=3376200",
+                 "+proj=sinu +lon_0=137 +R=3396190", "+proj=longlat +R=6051800"):
+        raster = gdal.GetDriverByName("MEM").Create("", 20, 12, 1, gdal.GDT_Int16)
+        raster.GetRasterBand(1).WriteArray(numpy.arange(240, dtype=numpy.int16).reshape(12, 20))
+        raster.SetSpatialRef(system(text))
+        raster.SetGeoTransform((10.0, 0.25, 0, 20.0, 0, -0.25) if system(text).IsGeographic() else (5000.0, 100.0, 0, 20000.0, 0, -100.0))
+        for driver, name in (("GTiff", "a.tif"), ("ISIS3", "a.cub"), ("PDS4", "a.xml"), ("VICAR", "a.vic"), ("AAIGrid", "a.asc")):
+            path = folder / name
+            for old in folder.glob("a.*"):
+                old.unlink()
+            try:
+                gdal.GetDriverByName(driver).CreateCopy(str(path), raster)
+            except RuntimeError:
+                continue
+            for old in folder.glob("*.aux.xml"):
+                old.unlink()
+            wanted = gdal.Open(str(path)).GetSpatialRef()
+            if wanted is None:
+                continue
+            isohf.must("convert", path, "-o", folder / "s.isohf", "--overwrite", "-q", "--projection", "none", "--lossless")
+            isohf.must("export", folder / "s.isohf", folder / "s.tif", "--overwrite", "-q")
+            found = gdal.Open(str(folder / "s.tif")).GetSpatialRef()
+            check(found.IsSame(wanted, ["CRITERION=EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS", "IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES"]),
+                  f"{text} in {name}: {found.ExportToWkt(['FORMAT=WKT2_2019'])}, must be {wanted.ExportToWkt(['FORMAT=WKT2_2019'])}")
+    for unit, wanted, text in (("m", "m", "EPSG:32632"), ("meters", "m", "EPSG:4326"), ("ft", "ft", "EPSG:2263"), ("US survey foot", "US survey foot", "EPSG:2263"),
+                               ("", "metre", "EPSG:32632+5773"), ("", "US survey foot", "EPSG:2263+6360"), ("", "", "EPSG:32632")):
+        write(folder / "u.tif", text, -74.0, 40.7, 30.0, (-74.0, 40.7), 0, 40)
+        raster = gdal.Open(str(folder / "u.tif"), gdal.GA_Update)
+        raster.GetRasterBand(1).SetUnitType(unit)
+        raster = None
+        for name in ("out.tif", "out.png"):
+            isohf.must("convert", folder / "u.tif", "-o", folder / "u.isohf", "--overwrite", "-q", "--projection", "none")
+            isohf.must("export", folder / "u.isohf", folder / name, "--overwrite", "-q")
+            ours = gdal.Open(str(folder / name))
+            found = ours.GetRasterBand(1).GetUnitType()
+            check(found == wanted, f"unit {unit!r} of {text} in {name}: {found!r}, must be {wanted!r}")
+            check(ours.GetSpatialRef().IsCompound() == system(text).IsCompound(), f"{text} with unit {unit!r} in {name}: heights")
+    # A .hgt lies on degrees alone for GDAL, and its heights go on being above EGM96.
+    (folder / "N44E006.hgt").write_bytes(numpy.full((1201, 1201), 500, dtype=">i2").tobytes())
+    isohf.must("convert", folder / "N44E006.hgt", "-o", folder / "h.isohf", "-q", "--projection", "none")
+    isohf.must("export", folder / "h.isohf", folder / "h.tif", "-q")
+    check(gdal.Open(str(folder / "h.tif")).GetSpatialRef().GetAuthorityCode(None) == "4326", "a .hgt is no EPSG:4326")
+    check("EGM96" in isohf.must("info", folder / "h.tif").stdout, "a .hgt's geoid is lost")
+
+
 def vicar(isohf, folder):
     """Maps in the label of a VICAR file lie where GDAL says, and a label that ends with one as well as one that goes on."""
     samples = numpy.arange(12, dtype=numpy.int16).reshape(3, 4)
@@ -426,6 +474,13 @@ def vicar(isohf, folder):
         raster.SetProjection(system(text).ExportToWkt().replace('DATUM["unknown"', 'DATUM["D_Moon"'))
         gdal.GetDriverByName("VICAR").CreateCopy(str(folder / "a.vic"), raster)
         same("a.vic")
+    # Of a map that the label has no words for the place stands beside.
+    raster.SetProjection(system("EPSG:32633").ExportToWkt())
+    gdal.GetDriverByName("VICAR").CreateCopy(str(folder / "d.vic"), raster)
+    (folder / "d.wld").write_text("100\n0\n0\n-100\n500050\n199950\n")
+    (folder / "d.prj").write_text(system("EPSG:32633").ExportToWkt())
+    place = json.loads(isohf.must("info", folder / "d.vic", "--json").stdout)
+    check((place["origin"], place["crs"]["epsg"]) == ({"x": 500050, "y": 199950}, 32633), f"VICAR and what is beside: {place}")
     head = ("LBLSIZE=1024      FORMAT='HALF' TYPE='IMAGE' BUFSIZ=8 DIM=3 EOL=0 RECSIZE=8 ORG='BSQ' NL=3 NS=4 NB=1 N1=4 N2=3 N3=1 N4=0 NBB=0 NLB=0 "
             "HOST='X86-64-LINX' INTFMT='LOW' REALFMT='RIEEE' BHOST='X86-64-LINX' BINTFMT='LOW' BLTYPE='' COMPRESS='NONE' EOCI1=0 EOCI2=0 "
             "PROPERTY='MAP' TARGET_NAME='MARS' A_AXIS_RADIUS=3396.19 B_AXIS_RADIUS=3396.19 C_AXIS_RADIUS=3376.2 "
@@ -599,6 +654,14 @@ def rotated(isohf, folder):
     isohf.refuses("rotated pole", "info", folder / "plain.tif", "--crs", "+proj=ob_tran +o_proj=longlat +o_lat_p=39.25 +o_lon_p=0 +lon_0=18 +R=6371229")
 
 
+# Of a program that a small process starts: its peak would count that of a large one.
+PEAK = """
+import resource, subprocess, sys
+subprocess.run(sys.argv[1:], check=True)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+"""
+
+
 WRITE_CHUNK = """
 import sys
 import numpy
@@ -612,7 +675,7 @@ made.Write(numpy.zeros((12000, 12000), dtype=numpy.float32))
 
 
 PARTS = (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
-         samples, geojp2, vicar, ellipsoidal, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated)
+         samples, geojp2, same_for_gdal, vicar, ellipsoidal, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated)
 
 if __name__ == "__main__":
     sys.exit(run_parts(PARTS, __doc__))
