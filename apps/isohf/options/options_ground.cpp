@@ -47,7 +47,9 @@ std::unique_ptr<HeightSource> laid_out(std::unique_ptr<HeightSource> source, con
 }
 
 std::unique_ptr<HeightSource> without_repeated_column(std::unique_ptr<HeightSource> source) {
-  if (closure_of(source->info()) != Closure::kRepeated) return source;
+  GroundRequest own;
+  understand_ground(source->info(), own);
+  if (closure_of(source->info(), own.source_map.get()) != Closure::kRepeated) return source;
   return std::make_unique<ClosedSource>(std::move(source));
 }
 

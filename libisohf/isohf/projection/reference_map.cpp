@@ -124,6 +124,36 @@ PlaceScale scale_at(const ReferenceMap& map, MapPoint place) {
   return {kNoNumber, kNoNumber, kNoNumber, kNoNumber, kNoNumber, kNoNumber, kNoNumber, kNoNumber};
 }
 
+std::optional<double> turn_of(const ReferenceMap& map, MapPoint near) {
+  const double longitude = map.geo_from_map(near).longitude;
+  if (!std::isfinite(longitude)) return std::nullopt;
+  constexpr double kReach = 30.0;
+  const auto sixth_of_turn = [&](double middle) -> std::optional<double> {
+    std::optional<double> sixth;
+    for (const double latitude : {0.0, 40.0, -65.0}) {
+      const auto at = [&](double degrees) {
+        return map.map_from_geo({std::remainder(middle + degrees, 360.0), latitude});
+      };
+      const MapPoint west = at(-kReach);
+      const MapPoint here = at(0.0);
+      const MapPoint east = at(kReach);
+      const double length = east.easting - west.easting;
+      const double least = 1e-9 * std::abs(length);
+      if (!sixth) sixth = length;
+      if (!(length > 0.0) || !(std::abs(length - *sixth) <= least) ||
+          !(std::abs(here.easting - west.easting - 0.5 * length) <= least) ||
+          !(std::abs(west.northing - here.northing) <= least) || !(std::abs(east.northing - here.northing) <= least)) {
+        return std::nullopt;
+      }
+    }
+    return sixth;
+  };
+  // One of them is not where the map is cut open.
+  auto sixth = sixth_of_turn(longitude);
+  if (!sixth) sixth = sixth_of_turn(longitude + 90.0);
+  return sixth ? std::optional(6.0 * *sixth) : std::nullopt;
+}
+
 std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& bounds) {
   MapGround ground;
   ground.centre = on_the_body(map.geo_from_map(bounds.middle()));

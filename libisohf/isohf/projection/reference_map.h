@@ -43,6 +43,10 @@ struct PlaceScale {
 /// NaN in every member where the map shows no place, or ends.
 [[nodiscard]] PlaceScale scale_at(const ReferenceMap& map, MapPoint place);
 
+/// Eastings once round the body on a map whose meridians are evenly spaced columns and whose parallels are rows, Mercator's
+/// and equidistant cylindrical ones; nullopt on any other. `near` is a place that the map shows.
+[[nodiscard]] std::optional<double> turn_of(const ReferenceMap& map, MapPoint near);
+
 /// Looks at 33 x 33 places, the sides included, and rounds to 1e-8 degrees and scales to 1e-7. Places that the map does
 /// not show are passed over; nullopt where it shows none of them.
 [[nodiscard]] std::optional<MapGround> ground_under(const ReferenceMap& map, const MapBounds& bounds);

@@ -65,20 +65,28 @@ class SourceColumns {
   double scale_;
 };
 
+/// Of the source's coordinates once round the body; nullopt where it is not known that they go on there.
+std::optional<double> once_round(const Metadata& metadata) {
+  const SourceRecord& source = metadata.source;
+  if (source.crs_unit == "degree") return kTurn;
+  if (!metadata.wraps_x) return std::nullopt;
+  return static_cast<double>(source.width) * source.crs_spacing_x;
+}
+
 /// The box by as many whole turns East that it lies on the archive's ground.
-MapBounds turned(const MapBounds& box, const Metadata& metadata) {
+MapBounds turned(const MapBounds& box, const Metadata& metadata, double turn) {
   const SourceColumns columns(metadata.source);
   const double west = columns.coordinate(metadata.valid.x0);
   const double east = columns.coordinate(metadata.valid.x1);
   const auto by = [&](double turns) {
-    return MapBounds{box.west + turns * kTurn, box.south, box.east + turns * kTurn, box.north};
+    return MapBounds{box.west + turns * turn, box.south, box.east + turns * turn, box.north};
   };
   // Less than this holds no sample: half of an area, or but the rounding of a post's coordinate.
   const double least =
       metadata.source.crs_spacing_x * (metadata.source.registration == Registration::kArea ? 0.5 : 1e-6);
-  const double first = std::ceil((west + least - box.east) / kTurn);
-  const double last = std::floor((east - least - box.west) / kTurn);
-  if (first > last) return by(std::round((west + east - box.west - box.east) / (2.0 * kTurn)));
+  const double first = std::ceil((west + least - box.east) / turn);
+  const double last = std::floor((east - least - box.west) / turn);
+  if (first > last) return by(std::round((west + east - box.west - box.east) / (2.0 * turn)));
   if (first == last) return by(first);
   for (double turns = first; turns <= last; turns += 1.0) {
     const MapBounds there = by(turns);
@@ -364,9 +372,9 @@ void refuse_system(const SourceInfo& other, const ReferenceSystem& own) {
 
 std::optional<Turn> turn_of(const Metadata& metadata) {
   const SourceRecord& source = metadata.source;
-  if (is_warped(metadata) || source.crs_unit != "degree" || !source.origin_x || !(source.crs_spacing_x > 0.0))
-    return std::nullopt;
-  return Turn{kTurn / source.crs_spacing_x * source.spacing_x, metadata.valid.x0, metadata.valid.x1};
+  const std::optional<double> turn = once_round(metadata);
+  if (is_warped(metadata) || !turn || !source.origin_x || !(source.crs_spacing_x > 0.0)) return std::nullopt;
+  return Turn{*turn / source.crs_spacing_x * source.spacing_x, metadata.valid.x0, metadata.valid.x1};
 }
 
 SampleGrid source_grid(const SourceRecord& source) {
@@ -689,7 +697,7 @@ WorldBounds world_bounds(const Metadata& metadata, const MapBounds& asked) {
     return {map.west - on.origin.easting, on.origin.northing - map.north, map.east - on.origin.easting,
             on.origin.northing - map.south};
   }
-  if (degrees) box = turned(box, metadata);
+  if (const auto turn = once_round(metadata)) box = turned(box, metadata, *turn);
   const SourceColumns columns(source);
   const double to_z = source.spacing_z / source.crs_spacing_y;
   WorldBounds bounds;

@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "isohf/error.h"
+#include "isohf/projection/reference_map.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/surface.h"
 
@@ -68,17 +69,20 @@ struct WorldGeoreference::State {
   double step_x = 0.0;
   double step_y = 0.0;
 
-  /// Of all turns of a longitude the one nearest to the source's middle: its own, from -180 or from 0 on.
+  std::optional<double> turn;  ///< of the source's coordinates once round the body, where a length of them is that
+
+  /// Of all turns of a longitude, or an easting, the one nearest to the source's middle: its own, from -180 or from 0 on.
   [[nodiscard]] double own_turn(double longitude) const {
+    if (!turn) return longitude;
     const double middle = first_sample.easting + 0.5 * static_cast<double>(geometry.width - 1) * step_x;
-    return middle + std::remainder(longitude - middle, 360.0);
+    return longitude - *turn * std::nearbyint((longitude - middle) / *turn);
   }
 
   [[nodiscard]] WorldPoint world_from_position(SourcePosition at) const {
     if (warp) return warp->world_from_source(at);
     double x = geometry.first_sample_x + at.u * geometry.spacing_x;
     if (geometry.wraps_x) {  // the West half of the first area is the end of the last tile
-      const double round = 360.0 / step_x * geometry.spacing_x;
+      const double round = turn.value_or(static_cast<double>(geometry.width) * step_x) / step_x * geometry.spacing_x;
       x -= round * std::floor(x / round);
     }
     return {x, geometry.first_sample_z + at.v * geometry.spacing_z};
@@ -99,6 +103,16 @@ WorldGeoreference::WorldGeoreference(const Metadata& metadata) {
     state->is_lost = state->geometry.warp && state->geometry.warp->projection.kind == ProjectionKind::kSystem &&
                      !state->geometry.warp->projection.map;
     if (state->geometry.warp && !state->is_lost) state->warp.emplace(*state->geometry.warp);
+    const double columns = static_cast<double>(source.width);
+    if (state->in_degrees) {
+      state->turn = 360.0;
+    } else if (metadata.wraps_x) {
+      state->turn = columns * state->step_x;
+    } else if (state->map) {
+      state->turn = turn_of(*state->map,
+                            {state->first_sample.easting + 0.5 * columns * state->step_x,
+                             state->first_sample.northing - 0.5 * static_cast<double>(source.height) * state->step_y});
+    }
   }
   state_ = std::move(state);
 }
@@ -129,7 +143,7 @@ GeoPoint WorldGeoreference::geo_from_world(WorldPoint point) const {
 
 WorldPoint WorldGeoreference::world_from_source(MapPoint point) const {
   const State& s = *state_;
-  if (s.in_degrees) point.easting = s.own_turn(point.easting);
+  point.easting = s.own_turn(point.easting);
   return s.world_from_position(
       {(point.easting - s.first_sample.easting) / s.step_x, (s.first_sample.northing - point.northing) / s.step_y});
 }
@@ -138,12 +152,13 @@ MapPoint WorldGeoreference::source_from_world(WorldPoint point) const {
   const State& s = *state_;
   if (s.warp) {
     const GeoPoint geo = s.warp->geo_from_world(point);
-    return s.map ? s.map->map_from_geo(geo) : MapPoint{s.own_turn(geo.longitude), geo.latitude};
+    const MapPoint at = s.map ? s.map->map_from_geo(geo) : MapPoint{geo.longitude, geo.latitude};
+    return {s.own_turn(at.easting), at.northing};
   }
   const SourceGeometry& g = s.geometry;
   const MapPoint at{s.first_sample.easting + (point.x - g.first_sample_x) / g.spacing_x * s.step_x,
                     s.first_sample.northing - (point.z - g.first_sample_z) / g.spacing_z * s.step_y};
-  return s.in_degrees ? MapPoint{s.own_turn(at.easting), at.northing} : at;
+  return {s.own_turn(at.easting), at.northing};
 }
 
 }  // namespace isohf

@@ -407,6 +407,39 @@ def geojp2(isohf, folder):
         check(numpy.array_equal(gdal.Open(str(folder / "s.tif")).ReadAsArray(), theirs), f"signed JPEG 2000, {options}: samples differ")
 
 
+def turns(isohf, folder):
+    """Globes in metres go round as those in degrees do: to the samples of their other end, at whatever longitude that is."""
+    turn, turn_of_mars = 2 * math.pi * 6378137.0, 2 * math.pi * 3396190.0
+    for text, west, length, north, repeated in (("EPSG:4087", -turn / 2, turn, turn / 4, 0), ("EPSG:3857", -turn / 2, turn, turn / 2, 0),
+                                                ("+proj=eqc +R=3396190 +lon_0=180", -turn_of_mars / 2, turn_of_mars, turn_of_mars / 4, 0),
+                                                ("+proj=eqc +R=3396190", 0.0, turn_of_mars, turn_of_mars / 4, 1)):
+        columns, rows = 180, 90
+        step = length / columns
+        own = system(text)
+        geo = own.CloneGeogCS()
+        geo.SetAxisMappingStrategy(osr.OAMS_TRADITIONAL_GIS_ORDER)
+        to_geo = osr.CoordinateTransformation(own, geo)
+        longitudes = numpy.radians([to_geo.TransformPoint(west + (c + 0.5) * step, 0.0)[0] for c in range(columns + repeated)])
+        raster = gdal.GetDriverByName("GTiff").Create(str(folder / "g.tif"), columns + repeated, rows, 1, gdal.GDT_Float32)
+        raster.SetGeoTransform((west, step, 0, north, 0, -2 * north / rows))
+        raster.SetSpatialRef(own)
+        raster.GetRasterBand(1).WriteArray(numpy.tile((1000 * numpy.cos(longitudes)).astype(numpy.float32), (rows, 1)))
+        raster = None
+        isohf.must("convert", folder / "g.tif", "-o", folder / "g.isohf", "--overwrite", "-q", "--wrap-x", "--lossless")
+        isohf.must("verify", folder / "g.isohf", "--against", folder / "g.tif")
+        isohf.must("restore", folder / "g.isohf", folder / "back.tif", "--overwrite", "-q")
+        check(numpy.array_equal(gdal.Open(str(folder / "back.tif")).ReadAsArray(), gdal.Open(str(folder / "g.tif")).ReadAsArray()[:, :columns]),
+              f"{text}: samples differ")
+        for longitude in (180.0, -179.5, 179.5, 0.0, 0.5, -0.5, 90.0, 200.0):
+            height = float(isohf.must("sample", folder / "g.isohf", "--at-lonlat", str(longitude), "1").stdout.split()[0])
+            check(abs(height - 1000 * math.cos(math.radians(longitude))) < 2, f"{text}: {height} at longitude {longitude}")
+        isohf.refuses("leave one of them out", "convert", folder / "g.tif", "-o", folder / "n.isohf", "--wrap-x", "--projection", "equirectangular")
+    write(folder / "u.tif", "EPSG:32632", 9.0, 46.0, 30.0, (9.0, 46.0), 0, 40)
+    isohf.refuses("on a map whose meridians are evenly spaced columns", "convert", folder / "u.tif", "-o", folder / "n.isohf", "--wrap-x")
+    write(folder / "p.tif", "EPSG:4087", 9.0, 46.0, 30.0, (9.0, 46.0), 0, 40)
+    isohf.refuses("needs columns all the way round, 40075016.68", "convert", folder / "p.tif", "-o", folder / "n.isohf", "--wrap-x")
+
+
 def same_for_gdal(isohf, folder):
     """What GDAL reads of an export is the very system that it reads of the source: names, meridian and method; and its unit."""
     for text in ("+proj=eqc +lat_ts=0 +lon_0=180 +R=3396190", "+proj=eqc +lat_ts=20 +lon_0=30 +R=1737400", "IAU_2015:49910", "IAU_2015:30100",
@@ -675,7 +708,7 @@ made.Write(numpy.zeros((12000, 12000), dtype=numpy.float32))
 
 
 PARTS = (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
-         samples, geojp2, same_for_gdal, vicar, ellipsoidal, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated)
+         samples, geojp2, turns, same_for_gdal, vicar, ellipsoidal, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated)
 
 if __name__ == "__main__":
     sys.exit(run_parts(PARTS, __doc__))

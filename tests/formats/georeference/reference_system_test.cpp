@@ -330,8 +330,11 @@ TEST_F(CylindricalMoon, ThatGoesRoundIsOfferedNoRemedyThatIsRefused) {
       scale_warning(info, frame, request.projection),
       HasSubstr("a part of it (`bbox`) can be laid on a truer map by `projection` auto; `projection` none keeps"));
   request.wrap_x = true;
-  EXPECT_THAT(error_of([&] { (void)make_source_frame(info, request); }).what(),
-              HasSubstr("`wrap_x` joins columns of an input in degrees; this one's are not"));
+  EXPECT_THAT(
+      error_of([&] { (void)make_source_frame(info, request); }).what(),
+      HasSubstr(
+          "needs columns all the way round, 10916406.1527 of the input's coordinates; its 437 columns 25000 apart "
+          "make 10925000"));
 }
 
 /// Files of neighbouring zones are of one resolution, whatever their maps' scales.

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "isohf/error.h"
+#include "isohf/projection/reference_map.h"
 
 namespace isohf {
 namespace {
@@ -56,6 +57,15 @@ void place_by_scale(const ProjectionSpec& spec, const SourceInfo& info, SourceFr
   const DegreeLengths degree = degree_lengths(spec.ellipsoid, spec.latitude_0);
   frame.spacing_x = place.spacing_x * degree.along_parallel;
   frame.spacing_z = place.spacing_y * degree.along_meridian;
+}
+
+/// Of a source's coordinates once round the body; nullopt where no length of them is that.
+std::optional<double> turn_of_coordinates(const SourceInfo& info, const ReferenceMap* map) {
+  const Georeference& place = info.georeference;
+  if (place.unit == HorizontalUnit::kDegree) return 360.0;
+  if (map == nullptr || !place.has_origin) return std::nullopt;
+  return turn_of(*map, {place.origin_x + 0.5 * static_cast<double>(info.width - 1) * place.spacing_x,
+                        place.origin_y - 0.5 * static_cast<double>(info.height - 1) * place.spacing_y});
 }
 
 /// The rectangle of its own coordinates that a source covers.
@@ -132,6 +142,7 @@ void place_on_map(const SourceInfo& info, const GroundRequest& request, SourceFr
   const MapBounds bounds = bounds_of(info, frame.registration);
   frame.ground = ground_under(map, bounds);
   if (!is_asked) return;
+  if (request.wrap_x) refuse_request("and `wrap_x`, which needs the input's rows to stay rows: leave one of them out");
   if (!frame.ground)
     refuse_request("has no place for the input: its own map shows nothing there; leave the option out");
   const MapGround& ground = *frame.ground;
@@ -200,10 +211,11 @@ void place_degrees(const SourceInfo& info, const GroundRequest& request, SourceF
 
 }  // namespace
 
-Closure closure_of(const SourceInfo& info) {
+Closure closure_of(const SourceInfo& info, const ReferenceMap* map) {
   const Georeference& place = info.georeference;
-  if (place.unit != HorizontalUnit::kDegree) return Closure::kOpen;
-  const double columns = 360.0 / place.spacing_x;
+  const std::optional<double> turn = turn_of_coordinates(info, map);
+  if (!turn) return Closure::kOpen;
+  const double columns = *turn / place.spacing_x;
   const auto width = static_cast<double>(info.width);
   constexpr double kTolerance = 0.01;
   if (std::abs(width - columns) <= kTolerance) return Closure::kClosed;
@@ -255,16 +267,19 @@ SourceFrame make_source_frame(const SourceInfo& info, const GroundRequest& reque
     frame.first_sample_z = frame.spacing_z / 2.0;
   }
   if (request.wrap_x) {
-    if (place.unit != HorizontalUnit::kDegree) {
-      refuse_source(info.path +
-                    ": `wrap_x` joins columns of an input in degrees; this one's are not, whether or not they go all "
-                    "the way round; leave the option out, or bring it to degrees (gdalwarp)");
-    }
-    if (closure_of(info) != Closure::kClosed) {
+    const ReferenceMap* const map = request.source_map.get();
+    const std::optional<double> turn = turn_of_coordinates(info, map);
+    if (!turn) {
       refuse_source(
-          fmt::format("{}: `wrap_x` needs columns all the way round, 360 degrees; this input's {} columns {:.9g} "
-                      "apart make {:.9g}",
-                      info.path, info.width, place.spacing_x, static_cast<double>(info.width) * place.spacing_x));
+          info.path +
+          ": `wrap_x` joins columns of an input in degrees, or on a map whose meridians are evenly spaced columns; "
+          "this one's are not; leave the option out, or bring it to degrees (gdalwarp)");
+    }
+    if (closure_of(info, map) != Closure::kClosed) {
+      refuse_source(fmt::format(
+          "{}: `wrap_x` needs columns all the way round, {:.12g} of the input's coordinates; its {} "
+          "columns {:.12g} apart make {:.12g}",
+          info.path, *turn, info.width, place.spacing_x, static_cast<double>(info.width) * place.spacing_x));
     }
     frame.wraps_x = true;
   }

@@ -47,12 +47,13 @@ struct SourceFrame {
 [[nodiscard]] std::string scale_warning(const SourceInfo& info, const SourceFrame& frame,
                                         const ProjectionRequest& request);
 
-/// How the columns of a source in degrees close round the body.
+/// How the columns of a source in degrees, or on a map on which a turn is a length, close round the body.
 enum class Closure {
   kOpen,      ///< they don't
-  kClosed,    ///< columns * spacing = 360 degrees, within a hundredth of a spacing
+  kClosed,    ///< columns * spacing = a turn, within a hundredth of a spacing
   kRepeated,  ///< the last column is the first one again
 };
-[[nodiscard]] Closure closure_of(const SourceInfo& info);
+/// map  that of a source that is not in degrees, where it is understood
+[[nodiscard]] Closure closure_of(const SourceInfo& info, const ReferenceMap* map = nullptr);
 
 }  // namespace isohf
