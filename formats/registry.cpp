@@ -41,6 +41,7 @@ const std::vector<Reader>& readers() {
       {{"TIFF", {".tif", ".tiff"}, tiff_library, "takes `channel`"}, looks_like_tiff, open_tiff},
       {{"PNG", {".png"}, png_library, "takes `channel` and `encoding`"}, looks_like_png, open_png},
       {{"WebP", {".webp"}, webp_library, "takes `channel` and `encoding`"}, looks_like_webp, open_webp},
+      {{"JPEG 2000", {".jp2", ".j2k", ".j2c"}, jp2_library, "takes `channel`"}, looks_like_jp2, open_jp2},
       {{"PMTiles", {".pmtiles"}, nullptr, "takes `encoding` and `part`"}, looks_like_pmtiles, open_pmtiles},
       {{"MBTiles", {".mbtiles"}, mbtiles_library, "takes `encoding` and `part`"}, looks_like_mbtiles, open_mbtiles},
       {{"ESRI ASCII grid, GRASS ASCII", {".asc"}}, looks_like_ascii_grid, open_ascii_grid, nullptr, true},
@@ -343,8 +344,9 @@ std::unique_ptr<HeightSource> open_by_head(const std::string& path, const OpenOp
   if (reader == nullptr) return open_with_oiio(path, options);
   const auto has_parts = {open_exr, open_packed, open_pmtiles, open_mbtiles};
   if (!options.part.empty() && std::ranges::find(has_parts, reader->open) == has_parts.end()) {
-    throw Error(ErrorCode::kInvalidArgument,
-                path + ": has no parts; `part` is for archives and OpenEXR files of several, and zoom levels of tiles");
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        path + ": has no parts; `part` is for archives and OpenEXR files of several, and zoom levels of tiles");
   }
   return head.in_gzip && !reader->in_gzip ? open_packed(path, options) : reader->open(path, options);
 }

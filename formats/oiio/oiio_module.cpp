@@ -24,8 +24,7 @@ struct IsohfOiioRaster {
   OIIO::ImageSpec spec;
   OIIO::TypeDesc type;
   int channel = 0;
-  int channels = 1;           ///< that are delivered, from `channel` on
-  bool is_displaced = false;  ///< undo_displacement() has work to do
+  int channels = 1;  ///< that are delivered, from `channel` on
   std::int64_t band_bytes = 0;
   std::vector<unsigned char> band;  ///< rows read around a window that does not end where the file's blocks do
 };
@@ -121,35 +120,19 @@ void require_stored_numbers(const std::string& format, int bits, int stored_bits
   }
 }
 
-/// Makes raster.type that of signed samples where a JPEG 2000 file has them. OpenImageIO 2.4 hands out value + 2^(bits / 2
-/// - 1) modulo 2^bits for them, which undo_displacement() takes back.
-void find_displacement(IsohfOiioRaster& raster, int bits, bool is_photo, const std::string& path) {
+/// What is left of JPEG 2000 here, photos and packed elevations, is of unsigned samples.
+void require_unsigned(const IsohfOiioRaster& raster, int bits, bool is_photo, const std::string& path) {
   const std::vector<ComponentKind> kinds = component_kinds(head_of(path));
   if (kinds.empty()) refuse("there is no codestream in its first MiB, so that nothing says whether samples are signed");
   if (static_cast<int>(kinds.size()) < raster.channel + raster.channels) return;  // made of a palette, unsigned
   const auto first = kinds.begin() + raster.channel;
   const auto end = first + raster.channels;
   const auto is_signed = [](const ComponentKind& kind) { return kind.is_signed; };
-  const bool some = std::any_of(first, end, is_signed);
+  if (std::any_of(first, end, is_signed)) refuse("the samples are signed, which OpenImageIO reads as if they were not");
   if (!is_photo && raster.channels == 1 && first->bits != bits) {
     refuse("the samples of this channel have " + std::to_string(first->bits) +
            " bits, and OpenImageIO spreads them over " + std::to_string(bits));
   }
-  if (!some) return;
-  constexpr int kKnown = 204;  // 2.4
-  if (is_photo || OIIO::openimageio_version() / 100 != kKnown || (bits != 8 && bits != 16)) {
-    refuse("the samples are signed, which OpenImageIO reads as if they were not");
-  }
-  if (!std::all_of(first, end, is_signed)) refuse("some channels are signed, others are not; `channel` names one");
-  raster.is_displaced = true;
-  raster.type = bits == 8 ? OIIO::TypeDesc::INT8 : OIIO::TypeDesc::INT16;
-}
-
-template <typename Unsigned>
-void undo_displacement(void* samples, std::size_t count) {
-  constexpr unsigned kDisplacement = 1U << (sizeof(Unsigned) * 4 - 1);
-  auto* const values = static_cast<Unsigned*>(samples);
-  for (std::size_t i = 0; i < count; ++i) values[i] = static_cast<Unsigned>(values[i] - kDisplacement);
 }
 
 /// Windows narrower than the raster, or in tiles, are cut out of bands of about this size.
@@ -241,7 +224,7 @@ bool open_raster(IsohfOiioRaster& raster, const char* path, const std::string& c
   raster.channel = all ? 0 : channel_index(spec, channel);
   raster.channels = all ? spec.nchannels : 1;
   raster.type = all ? spec.format : spec.channelformat(raster.channel);
-  if (std::string_view(raster.input->format_name()) == "jpeg2000") find_displacement(raster, bits, is_photo, path);
+  if (std::string_view(raster.input->format_name()) == "jpeg2000") require_unsigned(raster, bits, is_photo, path);
   const std::string space = spec.get_string_attribute("oiio:ColorSpace");
   info.channels = raster.channels;
   info.alpha = spec.alpha_channel;
@@ -266,22 +249,12 @@ void read_rows(IsohfOiioRaster& raster, int begin, int end, void* out) {
   const OIIO::ImageSpec& spec = raster.spec;
   const int from = spec.y + begin;
   const int to = spec.y + end;
-  // What it hands out as signed it would convert.
-  const OIIO::TypeDesc stored = !raster.is_displaced      ? raster.type
-                                : raster.type.size() == 1 ? OIIO::TypeDesc(OIIO::TypeDesc::UINT8)
-                                                          : OIIO::TypeDesc(OIIO::TypeDesc::UINT16);
   const bool done = spec.tile_width > 0
                         ? raster.input->read_tiles(0, 0, spec.x, spec.x + spec.width, from, to, spec.z, spec.z + 1,
-                                                   raster.channel, raster.channel + raster.channels, stored, out)
+                                                   raster.channel, raster.channel + raster.channels, raster.type, out)
                         : raster.input->read_scanlines(0, 0, from, to, spec.z, raster.channel,
-                                                       raster.channel + raster.channels, stored, out);
-  if (done) {
-    if (!raster.is_displaced) return;
-    const auto count = static_cast<std::size_t>(end - begin) * static_cast<std::size_t>(spec.width) *
-                       static_cast<std::size_t>(raster.channels);
-    return stored.size() == 1 ? undo_displacement<std::uint8_t>(out, count)
-                              : undo_displacement<std::uint16_t>(out, count);
-  }
+                                                       raster.channel + raster.channels, raster.type, out);
+  if (done) return;
   throw Error(ErrorCode::kCorrupt,
               "rows " + std::to_string(begin) + " to " + std::to_string(end - 1) + ": " + raster.input->geterror());
 }

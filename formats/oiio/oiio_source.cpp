@@ -16,7 +16,6 @@
 #include "formats/oiio/oiio_module.h"
 #include "formats/open_options.h"
 #include "formats/png/packed_elevations.h"
-#include "formats/tiff/geojp2.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -49,13 +48,6 @@ class OiioSource final : public HeightSource {
       if (channel.empty()) channel = decide_on_colours();
       const std::string warning = open(packing_ ? ISOHF_OIIO_ALL_CHANNELS : channel);
       if (!warning.empty()) info_.warnings.push_back(warning);
-      if (const GeoTags tags = geojp2_tags(path); !tags.empty()) {
-        try {
-          place(tags);
-        } catch (const Error& error) {
-          throw error.within(path);
-        }
-      }
       read_place_beside(info_, info_.channel.empty() ? 1 : 0);
       if (packing_) place_web_tile(info_);
       apply_open_options(info_, options);
@@ -99,17 +91,6 @@ class OiioSource final : public HeightSource {
     channels_ = static_cast<std::size_t>(found.channels);
     if (packing_) describe_packing(*packing_, channels_, static_cast<int>(8 * size_bytes(info_.sample_type)), info_);
     return found.warning;
-  }
-
-  void place(const GeoTags& tags) {
-    GeoTiffPlace found = place_from_geotiff(tags, info_.height);
-    if (found.rows_from_south) {
-      throw Error(ErrorCode::kUnsupported, "has its southernmost row first; gdalwarp turns it");
-    }
-    info_.georeference = std::move(found.georeference);
-    info_.vertical_unit = found.vertical_unit;
-    info_.metres_per_vertical_unit = found.metres_per_vertical_unit;
-    info_.warnings.insert(info_.warnings.end(), found.warnings.begin(), found.warnings.end());
   }
 
   void close() {

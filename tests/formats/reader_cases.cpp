@@ -341,6 +341,8 @@ std::vector<ReaderCase> reader_cases() {
       {"ImagineSpilled", "a.ige", ImagineBytes::spill(), open_imagine, {}},
       {"ZipOfGrid", "a.zip", zip("d/a.asc", esri + numbers), open_packed, {}},
       {"TarOfGrid", "a.tar", tar_archive({{"d/a.asc", esri + numbers}}), open_packed, {}},
+      {"Jpeg2000", "a.j2k", read_file(data + "signed8.j2k"), open_jp2, {}},
+      {"Jpeg2000Tiled", "a.jp2", read_file(data + "tiled.jp2"), open_jp2, {}},
       {"Webp", "a.webp", read_file(data + "small.webp"), open_webp, packed},
       {"Pmtiles", "a.pmtiles", read_file(data + "small.pmtiles"), open_pmtiles, {}},
       {"PngDescription", "described.png.json", "", open_png, {}},

@@ -407,6 +407,37 @@ def geojp2(isohf, folder):
         check(numpy.array_equal(gdal.Open(str(folder / "s.tif")).ReadAsArray(), theirs), f"signed JPEG 2000, {options}: samples differ")
 
 
+def jpeg2000(isohf, folder):
+    """Numbers of any bits come as they are, decoded by parts: strips, or tiles, wherever the picture begins."""
+    driver = gdal.GetDriverByName("JP2OpenJPEG")
+    if driver is None:
+        return
+    rng = numpy.random.default_rng(7)
+    for bits, kind, low, high, options in ((8, gdal.GDT_Byte, 0, 255, ()), (10, gdal.GDT_UInt16, 0, 1023, ("NBITS=10",)),
+                                           (16, gdal.GDT_UInt16, 0, 65535, ("BLOCKXSIZE=64", "BLOCKYSIZE=48")),
+                                           (16, gdal.GDT_Int16, -32768, 32767, ("BLOCKXSIZE=4096", "BLOCKYSIZE=4096")),
+                                           (20, gdal.GDT_UInt32, 0, (1 << 20) - 1, ("NBITS=20", "CODEC=J2K"))):
+        for width, height in ((300, 700), (5000, 70)):
+            samples = rng.integers(low, high, (height, width), endpoint=True)
+            raster = gdal.GetDriverByName("MEM").Create("", width, height, 1, kind)
+            raster.GetRasterBand(1).WriteArray(samples)
+            driver.CreateCopy(str(folder / "a.jp2"), raster, options=["REVERSIBLE=YES", "QUALITY=100", *options])
+            isohf.must("convert", folder / "a.jp2", "-o", folder / "a.isohf", "--overwrite", "-q", "--lossless")
+            isohf.must("restore", folder / "a.isohf", folder / "a.tif", "--overwrite", "-q")
+            check(numpy.array_equal(gdal.Open(str(folder / "a.tif")).ReadAsArray(), samples), f"JPEG 2000 of {bits} bits, {options}: samples differ")
+    smooth = numpy.add.outer(numpy.arange(4096), numpy.arange(4096)).astype(numpy.uint16)
+    raster = gdal.GetDriverByName("MEM").Create("", 4096, 4096, 1, gdal.GDT_UInt16)
+    raster.GetRasterBand(1).WriteArray(smooth)
+    driver.CreateCopy(str(folder / "one.jp2"), raster, options=["REVERSIBLE=YES", "QUALITY=100", "BLOCKXSIZE=4096", "BLOCKYSIZE=4096"])
+    measured = subprocess.run([sys.executable, "-c", PEAK, f"{isohf.bin}/isohf", "convert", str(folder / "one.jp2"), "-o", str(folder / "o.isohf"),
+                               "-q", "--memory", "100M", "--threads", "1"], stdout=subprocess.PIPE, text=True, check=True)
+    check(int(measured.stdout) < 100000, f"JPEG 2000 of one tile within 100 MB takes {measured.stdout} kB; whole it is 64 MB of samples alone")
+    whole = (folder / "one.jp2").read_bytes()
+    for length in (len(whole) // 3, len(whole) - 40):
+        (folder / "cut.jp2").write_bytes(whole[:length])
+        isohf.refuses("its codestream is damaged or cut off", "convert", folder / "cut.jp2", "-o", folder / "c.isohf", "-q")
+
+
 def turns(isohf, folder):
     """Globes in metres go round as those in degrees do: to the samples of their other end, at whatever longitude that is."""
     turn, turn_of_mars = 2 * math.pi * 6378137.0, 2 * math.pi * 3396190.0
@@ -708,7 +739,7 @@ made.Write(numpy.zeros((12000, 12000), dtype=numpy.float32))
 
 
 PARTS = (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
-         samples, geojp2, turns, same_for_gdal, vicar, ellipsoidal, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated)
+         samples, geojp2, jpeg2000, turns, same_for_gdal, vicar, ellipsoidal, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated)
 
 if __name__ == "__main__":
     sys.exit(run_parts(PARTS, __doc__))

@@ -151,17 +151,6 @@ TEST_F(OiioModule, RefusesFilesWhoseNumbersItWouldNotGet) {
   refuses("d.fits", fits, "OpenImageIO displaces the rows of FITS images; store the raster as TIFF or PNG");
 }
 
-/// opj_compress of every number of 8 bits, sixteen times each. Those of 16 bits are in tests/cli/gdal/placement.py.
-TEST_F(OiioModule, SignedSamplesOfJpeg2000AreThoseStored) {
-  const auto source = open_raster(std::string(ISOHF_SOURCE_DIR) + "/tests/formats/data/signed8.j2k", {});
-  ASSERT_EQ(source->info().sample_type, SampleType::kInt8);
-  const std::vector<double> values = values_of(*source);
-  ASSERT_EQ(values.size(), 4096U);
-  for (std::size_t i = 0; i < values.size(); ++i) ASSERT_EQ(values[i], static_cast<double>(i / 16) - 128.0) << i;
-  EXPECT_EQ(value_at(SampleType::kInt8, read_window(*source, {30, 31, 3, 2}), 4),
-            static_cast<double>((32 * 64 + 31) / 16) - 128.0);
-}
-
 TEST_F(OiioModule, AppliesTheOpenOptions) {
   OpenOptions options;
   options.z_scale = 0.5;
