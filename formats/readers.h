@@ -24,7 +24,7 @@ namespace isohf {
 [[nodiscard]] bool looks_like_exr(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_exr(const std::string& path, const OpenOptions& options);
 
-/// The first full-size image of a TIFF, GeoTIFF, BigTIFF or COG file (TIFF 6.0; OGC GeoTIFF 1.1, 19-008r4): integers of
+/// The first full-size image, or that of the number options.part, of a TIFF, GeoTIFF, BigTIFF or COG file (TIFF 6.0; OGC GeoTIFF 1.1, 19-008r4): integers of
 /// 8 to 32 bits, floats of 16 to 64, strips or tiles, any compression that libtiff was built with, interleaved or
 /// separate samples, of which options.channel picks one ("0", "1", ... or "R", "G", "B", "A", "Y").
 /// A raster stored from South to North (by its transformation, or by orientation bottom-left without a georeference) is

@@ -38,7 +38,7 @@ struct Reader {
 const std::vector<Reader>& readers() {
   static const std::vector<Reader> table = {
       {{"OpenEXR", {".exr"}, exr_library, "takes `channel` and `part`"}, looks_like_exr, open_exr},
-      {{"TIFF", {".tif", ".tiff"}, tiff_library, "takes `channel`"}, looks_like_tiff, open_tiff},
+      {{"TIFF", {".tif", ".tiff"}, tiff_library, "takes `channel` and `part`"}, looks_like_tiff, open_tiff},
       {{"PNG", {".png"}, png_library, "takes `channel` and `encoding`"}, looks_like_png, open_png},
       {{"WebP", {".webp"}, webp_library, "takes `channel` and `encoding`"}, looks_like_webp, open_webp},
       {{"JPEG 2000", {".jp2", ".j2k", ".j2c"}, jp2_library, "takes `channel`"}, looks_like_jp2, open_jp2},
@@ -342,11 +342,11 @@ std::unique_ptr<HeightSource> open_by_head(const std::string& path, const OpenOp
                 path + ": is something unknown in gzip, which isohf does not read; gunzip it first");
   }
   if (reader == nullptr) return open_with_oiio(path, options);
-  const auto has_parts = {open_exr, open_packed, open_pmtiles, open_mbtiles};
+  const auto has_parts = {open_exr, open_tiff, open_packed, open_pmtiles, open_mbtiles};
   if (!options.part.empty() && std::ranges::find(has_parts, reader->open) == has_parts.end()) {
     throw Error(
         ErrorCode::kInvalidArgument,
-        path + ": has no parts; `part` is for archives and OpenEXR files of several, and zoom levels of tiles");
+        path + ": has no parts; `part` is for archives, TIFF and OpenEXR files of several, and zoom levels of tiles");
   }
   return head.in_gzip && !reader->in_gzip ? open_packed(path, options) : reader->open(path, options);
 }

@@ -317,11 +317,12 @@ class VicarSource final : public DescribedSource {
                                        : BandOrder::kBands,
                       choose_band(info_, options, bands), bands, header_, static_cast<std::uint64_t>(prefix));
     place_by_map(text);
+    if (!info_.georeference.has_origin) read_place_beside(info_, bands == 1 ? 1 : 0);
     finish(options);
   }
 
  private:
-  /// The property MAP, which goes on up to the next one or the first task: the words of PDS3's IMAGE_MAP_PROJECTION.
+  /// The property MAP, where it names a map, which goes on up to the next one or the first task: the words of PDS3's IMAGE_MAP_PROJECTION.
   void place_by_map(const std::string& label) {
     constexpr std::string_view kMap = "PROPERTY='MAP'";
     const std::size_t begin = label.find(kMap);
@@ -330,7 +331,9 @@ class VicarSource final : public DescribedSource {
     const std::size_t end = std::min(label.find(" PROPERTY=", first), label.find(" TASK=", first));
     LabelBlock map{"IMAGE_MAP_PROJECTION", 0, {}, {}};
     LabelBlock root;
-    for (const auto& [key, value] : vicar_words(std::string_view(label).substr(first, end - first))) {
+    const HeaderWords words = vicar_words(std::string_view(label).substr(first, end - first));
+    if (!words.contains("map_projection_type")) return;  // GDAL has its map in a file beside
+    for (const auto& [key, value] : words) {
       auto& entries = key == "target_name" ? root.entries : map.entries;
       entries.push_back({upper_case(key), {{value, {}}}, 0});
     }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <numbers>
 #include <optional>
 #include <pugixml.hpp>
 #include <string>
@@ -18,10 +19,12 @@
 #include "formats/files/text_tokens.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/map_wkt.h"
+#include "formats/georeference/reference_system.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "isohf/error.h"
+#include "isohf/projection/reference_map.h"
 #include "isohf/raster.h"
 
 namespace isohf {
@@ -326,7 +329,8 @@ class Pds4Source final : public DescribedSource {
         info_.warnings.push_back(
             loss("the label gives no pixel_resolution or upperleft_corner in metres; the place is left out"));
       } else {
-        return place_by_corner(*x, *y, *dx, *dy);
+        place_by_corner(*x, *y, *dx, *dy);
+        return compare_with_bounds(cartography, to_west);
       }
       place.unit = HorizontalUnit::kUnknown;
     } else if (degrees) {
@@ -345,6 +349,56 @@ class Pds4Source final : public DescribedSource {
       place.unit = HorizontalUnit::kDegree;
       place_by_corner(*west, *north, *dx, *dy);
     }
+  }
+
+  /// Warns where the label's bounds are those of other ground than its map's.
+  void compare_with_bounds(const pugi::xml_node& cartography, bool to_west) {
+    const auto side = [&](const char* name) { return number_in(cartography, name); };
+    const auto west = side("west_bounding_coordinate");
+    const auto east = side("east_bounding_coordinate");
+    const auto south = side("south_bounding_coordinate");
+    const auto north = side("north_bounding_coordinate");
+    const Georeference& place = info_.georeference;
+    if (!west || !east || !south || !north || place.system.wkt.empty()) return;
+    std::optional<MapGround> found;
+    bool is_cylinder = false;
+    const double half_x = place.spacing_x / 2.0;
+    const double half_y = place.spacing_y / 2.0;
+    const MapBounds area{
+        place.origin_x - half_x, place.origin_y + half_y - static_cast<double>(info_.height) * place.spacing_y,
+        place.origin_x - half_x + static_cast<double>(info_.width) * place.spacing_x, place.origin_y + half_y};
+    try {
+      const auto map = understand_map(place.system.wkt, place.metres_per_unit);
+      found = ground_under(*map, area);
+      is_cylinder = turn_of(*map, area.middle()).has_value();
+    } catch (const Error&) {  // without PROJ nobody can tell
+    }
+    if (!found) return;
+    const GeoExtent& ours = found->extent;
+    const GeoExtent theirs{to_west ? -*west : *west, *south, to_west ? -*east : *east, *north};
+    // Labels round, count from middles of pixels, and have latitudes of normals or of the centre: on Mars 0.34 degrees.
+    const auto margin = [](double length, std::int64_t pixels) {
+      return std::max({0.01, 0.01 * length, 1.5 * length / static_cast<double>(pixels)});
+    };
+    const double inverse = place.system.inverse_flattening.value_or(0.0);
+    const double tilt = inverse > 0.0 ? 180.0 / std::numbers::pi / inverse : 0.0;
+    const double margin_x = margin(ours.east - ours.west, info_.width);
+    const double margin_y = margin(ours.north - ours.south, info_.height) + tilt;
+    const double length = std::min(theirs.east - theirs.west + (theirs.east <= theirs.west ? 360.0 : 0.0), 360.0);
+    const auto apart = [](double a, double b) { return std::abs(std::remainder(a - b, 360.0)); };
+    // On other maps than cylinders bounds may be those of edges, corners or a circle: the middle is what they must hold.
+    const bool holds_middle = apart(found->centre.longitude, theirs.west + length / 2.0) <= length / 2.0 + margin_x &&
+                              found->centre.latitude >= theirs.south - margin_y &&
+                              found->centre.latitude <= theirs.north + margin_y;
+    const bool is_same = apart(ours.west, theirs.west) <= margin_x && apart(ours.east, theirs.east) <= margin_x &&
+                         std::abs(ours.south - theirs.south) <= margin_y &&
+                         std::abs(ours.north - theirs.north) <= margin_y;
+    if (is_cylinder ? is_same : holds_middle || std::abs(found->centre.latitude) > 89.0) return;
+    info_.warnings.push_back(fmt::format(
+        "the label's bounds, longitudes {:.6g} to {:.6g} and latitudes {:.6g} to {:.6g}, are not those of its map, "
+        "{:.6g} to "
+        "{:.6g} and {:.6g} to {:.6g}; the map is followed",
+        theirs.west, theirs.east, theirs.south, theirs.north, ours.west, ours.east, ours.south, ours.north));
   }
 
   pugi::xml_node array_;

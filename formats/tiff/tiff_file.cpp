@@ -419,26 +419,25 @@ TiffMainImage open_image(const RawFile& file, std::uint32_t directory) {
   return image;
 }
 
-TiffMainImage open_main_image(const RawFile& file) {
+TiffMainImage open_main_image(const RawFile& file, std::uint32_t wanted) {
   auto walk = std::make_unique<TiffHandle::Impl>(file, false);
   TiffDirectories found;
-  bool has_main = false;
   bool walked = false;
   for (std::uint32_t i = 0; i < kMostDirectories; ++i) {
     const auto kind = walk->field<std::uint32_t>(TIFFTAG_SUBFILETYPE, 0);
     const bool mask = (kind & FILETYPE_MASK) != 0;
     const bool reduced = (kind & FILETYPE_REDUCEDIMAGE) != 0;
-    if (mask && !reduced && has_main && !found.has_more_pages && !found.mask) found.mask = i;
-    if (!mask && !reduced) {
-      if (has_main) found.has_more_pages = true;
-      if (!has_main) found.main = i;
-      has_main = true;
-    }
+    if (mask && !reduced && found.images == wanted + 1 && !found.mask) found.mask = i;
+    if (!mask && !reduced && found.images++ == wanted) found.main = i;
     if (TIFFLastDirectory(walk->tif) != 0) break;
     walked = true;
     found.has_broken = TIFFReadDirectory(walk->tif) != 1;
     if (found.has_broken && walk->io_error) std::rethrow_exception(walk->io_error);
     if (found.has_broken) break;
+  }
+  if (wanted > 0 && wanted >= found.images) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: there is no image {}; there are 0 to {}", file.path(),
+                                                         wanted, std::max(found.images, 1U) - 1));
   }
   // A walk leaves the handle elsewhere, with what libtiff said of other images.
   if (walked) walk = TiffHandle::Impl::on_directory(file, found.main, false);

@@ -66,9 +66,9 @@ struct TiffBlockSpan {
 
 /// The directories (images) of a file.
 struct TiffDirectories {
-  std::uint32_t main = 0;             ///< the first that is neither a reduced image nor a mask
+  std::uint32_t main = 0;             ///< the one wanted of those that are neither a reduced image nor a mask
   std::optional<std::uint32_t> mask;  ///< the main image's transparency mask, which follows it
-  bool has_more_pages = false;        ///< another is a full-size image
+  std::uint32_t images = 0;           ///< that are full-size ones
   bool has_broken = false;            ///< one behind the last that was read is broken
 };
 
@@ -104,7 +104,7 @@ class TiffHandle {
   std::vector<std::byte> scratch;
 
  private:
-  friend TiffMainImage open_main_image(const RawFile& file);
+  friend TiffMainImage open_main_image(const RawFile& file, std::uint32_t wanted);
   struct Impl;
   explicit TiffHandle(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
@@ -119,8 +119,8 @@ struct TiffMainImage {
 /// A handle on another directory of the file, as its main image. Throws Error{kCorrupt} where it cannot be read.
 [[nodiscard]] TiffMainImage open_image(const RawFile& file, std::uint32_t directory);
 
-/// Opens the file once where it holds one image: of ten thousand small files in a mosaic, opening is most of the work.
-/// Throws Error{kCorrupt} where not even the first directory can be read.
-[[nodiscard]] TiffMainImage open_main_image(const RawFile& file);
+/// Opens the full-size image of a number, from 0 on, and the file once where it holds one alone: of ten thousand small files in a mosaic, opening is most of the work.
+/// Throws Error{kCorrupt} where not even the first directory can be read; Error{kInvalidArgument} without such an image.
+[[nodiscard]] TiffMainImage open_main_image(const RawFile& file, std::uint32_t wanted = 0);
 
 }  // namespace isohf

@@ -257,7 +257,8 @@ class TiffSource final : public HeightSource {
  public:
   TiffSource(const std::string& path, const OpenOptions& options) : file_(path) {
     info_.path = path;
-    TiffMainImage image = open_main_image(file_);
+    page_ = page_of(options.part);
+    TiffMainImage image = open_main_image(file_, page_);
     const TiffTags tags = image.handle->read_tags();
     layout_ = image.handle->read_layout();
     try {
@@ -276,11 +277,12 @@ class TiffSource final : public HeightSource {
   /// What tells which samples are transparent; null where nothing does.
   [[nodiscard]] std::unique_ptr<HeightSource> open_opacity() const {
     if (mask_) return open_tiff_mask(info_.path, *mask_, turned_);
-    const std::string beside = info_.path + ".msk";  // as GDAL writes them
-    if (is_file(beside)) return open_tiff_mask(beside, 0, turned_);
+    const std::string beside = info_.path + ".msk";  // as GDAL writes them, of the first image
+    if (page_ == 0 && is_file(beside)) return open_tiff_mask(beside, 0, turned_);
     if (!has_grey_and_opacity(layout_) || channel_ != 0) return nullptr;
     OpenOptions options;
     options.channel = "A";
+    options.part = std::to_string(page_);
     return std::make_unique<TiffSource>(info_.path, options);
   }
 
@@ -315,8 +317,11 @@ class TiffSource final : public HeightSource {
     for (const std::string& warning : tags.warnings) info_.warnings.push_back("libtiff: " + warning);
     channel_ =
         choose_channel(layout_, gdal_band_names(tags.gdal_metadata, layout_.samples_per_pixel), options.channel, info_);
-    if (directories.has_more_pages)
-      info_.warnings.emplace_back("there are several images in the file; the first is read");
+    if (directories.images > 1 && options.part.empty()) {
+      info_.warnings.push_back(
+          fmt::format("there are {} images in the file; the first is read, `part` 0 to {} names one",
+                      directories.images, directories.images - 1));
+    }
     if (directories.has_broken)
       info_.warnings.push_back(
           loss("a directory behind the image is damaged; a transparency mask there is not applied"));
@@ -327,6 +332,14 @@ class TiffSource final : public HeightSource {
     read_files_beside();
     check_orientation();
     bound_undeclared_voids(info_);
+  }
+
+  [[nodiscard]] std::uint32_t page_of(const std::string& part) const {
+    std::uint32_t page = 0;
+    const auto [end, failure] = std::from_chars(part.data(), part.data() + part.size(), page);
+    if (part.empty() || (failure == std::errc() && end == part.data() + part.size())) return page;
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: its images have numbers, from 0; there is no \"{}\"", info_.path, printable(part)));
   }
 
   [[nodiscard]] bool fills_no_bytes() const {
@@ -381,7 +394,7 @@ class TiffSource final : public HeightSource {
 
   /// What the tags leave open may stand in other files.
   void read_files_beside() {
-    read_auxiliary_metadata(info_, channel_ + 1);
+    if (page_ == 0) read_auxiliary_metadata(info_, channel_ + 1);  // which GDAL keeps apart of others
     if (!is_placed_ && !info_.georeference.has_origin) place_by_world_file();
     if (!has_reference_system(info_.georeference)) read_prj_beside(info_);
   }
@@ -424,6 +437,7 @@ class TiffSource final : public HeightSource {
   RawFile file_;
   TiffLayout layout_;
   SourceInfo info_;
+  std::uint32_t page_ = 0;  // of several images
   int channel_ = 0;
   std::optional<std::uint32_t> mask_;
   bool is_placed_ = false;  // by its tags, if without an origin

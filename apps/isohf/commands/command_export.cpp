@@ -258,6 +258,7 @@ class Exporter {
     if (is_floating(type)) {
       if (options_.z_range)
         throw Error(ErrorCode::kInvalidArgument, "export: --z-range is for integer types; floats hold elevations");
+      if (type == SampleType::kFloat16) warn_of_halves(options_.raster.output, archive_.metadata());
       return {type, 1.0, 0.0};
     }
     if (options_.z_range) return spread(type, *options_.z_range, has_voids);

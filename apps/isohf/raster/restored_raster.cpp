@@ -124,6 +124,15 @@ void warn_of_whole_numbers(const std::string& output, const Metadata& metadata) 
                                  unit == "unknown" ? "of their unit" : unit)));
 }
 
+void warn_of_halves(const std::string& output, const Metadata& metadata) {
+  const Statistics& found = metadata.statistics;
+  const double largest = std::max(std::abs(found.min.value_or(0.0)), std::abs(found.max.value_or(0.0)));
+  if (!(largest > 0.0)) return;
+  const std::string& unit = metadata.vertical_unit;
+  print_warning(loss(fmt::format("{}: half floats have 11 bits: elevations are rounded by up to {:.3g} {}", output,
+                                 std::exp2(std::ilogb(largest) - 11), unit == "unknown" ? "of their unit" : unit)));
+}
+
 void warn_of_losses(const std::string& output, const RasterSpec& spec) {
   const RasterKind kind = raster_kind(output);
   std::vector<Warning> lost;

@@ -40,6 +40,8 @@ enum class RasterKind { kTiff, kExr, kPng, kHgt, kAsc, kFlt, kRaw16, kRaw32, kNp
 [[nodiscard]] SampleMapping spread_over(SampleType type, RowReader rows, const Job& job, bool& has_voids);
 /// A warning that elevations in `output` are rounded to whole units.
 void warn_of_whole_numbers(const std::string& output, const Metadata& metadata);
+/// A warning of how far half floats round the archive's largest elevation.
+void warn_of_halves(const std::string& output, const Metadata& metadata);
 /// Warnings of what `spec` says and the format of `output` has no place for, or says otherwise.
 void warn_of_losses(const std::string& output, const RasterSpec& spec);
 

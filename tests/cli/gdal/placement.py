@@ -519,6 +519,67 @@ def same_for_gdal(isohf, folder):
     check("EGM96" in isohf.must("info", folder / "h.tif").stdout, "a .hgt's geoid is lost")
 
 
+def bounds_of_labels(isohf, folder):
+    """Bounds of a PDS4 label that are those of other ground than its map's are told; what GDAL writes is not."""
+    for text, place in (("+proj=eqc +R=3396190 +lon_0=180", (100000.0, 500.0, 0, 900000.0, 0, -500.0)),
+                        ("+proj=eqc +lat_ts=40 +R=3396190 +lon_0=10", (-2e6, 50000.0, 0, 2e6, 0, -50000.0)),
+                        ("+proj=sinu +R=3396190 +lon_0=30", (100000.0, 500.0, 0, 900000.0, 0, -500.0)),
+                        ("+proj=stere +lat_0=90 +R=1737400", (-20000.0, 1000.0, 0, 20000.0, 0, -1000.0)),
+                        ("+proj=merc +R=1737400", (100000.0, 500.0, 0, 900000.0, 0, -500.0))):
+        raster = gdal.GetDriverByName("MEM").Create("", 40, 40, 1, gdal.GDT_Int16)
+        raster.GetRasterBand(1).WriteArray(numpy.arange(1600, dtype=numpy.int16).reshape(40, 40))
+        raster.SetSpatialRef(system(text))
+        raster.SetGeoTransform(place)
+        gdal.GetDriverByName("PDS4").CreateCopy(str(folder / "a.xml"), raster)
+        (folder / "a.xml.aux.xml").unlink(missing_ok=True)
+        said = isohf.must("info", folder / "a.xml").stderr
+        check("bounds" not in said, f"{text}: GDAL's own label: {said}")
+        if "stere" in text:
+            continue
+        label = (folder / "a.xml").read_text()
+        for name, by in (("west", 0), ("east", 0), ("north", 12), ("south", 12)):
+            tag = f"{name}_bounding_coordinate"
+            begin = label.index(">", label.index(f"<cart:{tag}")) + 1
+            end = label.index("<", begin)
+            label = label[:begin] + str(float(label[begin:end]) + by) + label[end:]
+        (folder / "a.xml").write_text(label)
+        said = isohf.must("info", folder / "a.xml").stderr
+        check("the label's bounds" in said and "the map is followed" in said, f"{text}: bounds 12 degrees further North: {said}")
+
+
+def pages(isohf, folder):
+    """A TIFF's images are named by numbers; overviews and masks are none."""
+    for i in range(3):
+        one = gdal.GetDriverByName("MEM").Create("", 40, 30 + i, 1, gdal.GDT_Int16)
+        one.GetRasterBand(1).WriteArray(numpy.full((30 + i, 40), 7 * i) + numpy.arange(40, dtype=numpy.int16))
+        options = ["APPEND_SUBDATASET=YES"] if i else []
+        gdal.GetDriverByName("GTiff").CreateCopy(str(folder / "p.tif"), one, options=options)
+        if i == 0:
+            gdal.Open(str(folder / "p.tif"), gdal.GA_Update).BuildOverviews("AVERAGE", [2, 4])
+    check("there are 3 images in the file; the first is read, --part 0 to 2 names one" in isohf.must("info", folder / "p.tif").stderr, "pages are not told")
+    for part, height in (("0", 30), ("1", 31), ("2", 32)):
+        found = json.loads(isohf.must("info", folder / "p.tif", "--json", "--part", part).stdout)
+        check(found["height"] == height, f"page {part}: {found['height']} rows")
+        isohf.must("convert", folder / "p.tif", "-o", folder / "p.isohf", "--overwrite", "-q", "--part", part, "--lossless")
+        isohf.must("restore", folder / "p.isohf", folder / "q.tif", "--overwrite", "-q")
+        check(gdal.Open(str(folder / "q.tif")).ReadAsArray()[3, 0] == 7 * int(part), f"page {part}: other samples")
+        isohf.must("verify", folder / "p.isohf", "--against", folder / "p.tif")
+    isohf.refuses("there is no image 3; there are 0 to 2", "info", folder / "p.tif", "--part", "3")
+    isohf.refuses("its images have numbers", "info", folder / "p.tif", "--part", "last")
+
+
+def numbers_of_no_unit(isohf, folder):
+    """Codes that are told for what they may be, and what half floats take."""
+    for name, high, is_told in (("a.png", 60000, True), ("b.png", 4000, False)):
+        raster = gdal.GetDriverByName("MEM").Create("", 40, 30, 1, gdal.GDT_UInt16)
+        raster.GetRasterBand(1).WriteArray(numpy.linspace(0, high, 1200).reshape(30, 40).astype(numpy.uint16))
+        gdal.GetDriverByName("PNG").CreateCopy(str(folder / name), raster)
+        said = isohf.must("convert", folder / name, "-o", folder / "n.isohf", "--overwrite").stderr
+        check(("more than any ground is high; where they are not metres, give --z-scale and --z-offset" in said) == is_told, f"{name}: {said}")
+    said = isohf.must("export", folder / "n.isohf", folder / "h.tif", "--type", "f16").stderr
+    check("half floats have 11 bits: elevations are rounded by up to 1 of their unit" in said, f"f16: {said}")
+
+
 def vicar(isohf, folder):
     """Maps in the label of a VICAR file lie where GDAL says, and a label that ends with one as well as one that goes on."""
     samples = numpy.arange(12, dtype=numpy.int16).reshape(3, 4)
@@ -739,7 +800,7 @@ made.Write(numpy.zeros((12000, 12000), dtype=numpy.float32))
 
 
 PARTS = (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
-         samples, geojp2, jpeg2000, turns, same_for_gdal, vicar, ellipsoidal, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated)
+         samples, geojp2, jpeg2000, turns, same_for_gdal, bounds_of_labels, pages, numbers_of_no_unit, vicar, ellipsoidal, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated)
 
 if __name__ == "__main__":
     sys.exit(run_parts(PARTS, __doc__))

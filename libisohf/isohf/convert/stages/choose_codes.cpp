@@ -78,8 +78,17 @@ SourceSurvey survey_source(const Conversion& conversion, const RowRange& rows, E
   return survey;
 }
 
-/// Elevations 0 to 1 in floats or scaled integers are most often a fraction of something.
+/// Elevations 0 to 1 in floats are most often a fraction of something, and whole numbers without unit and place that are
+/// beyond any ground codes.
 void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std::vector<Warning>& warnings) {
+  constexpr double kHighest = 9000.0;  // metres on the Earth
+  if (info.sample_type == SampleType::kUint16 && range.max > kHighest && info.vertical_unit.empty() &&
+      !info.georeference.has_origin && info.z_scale == 1.0 && info.z_offset == 0.0) {
+    warnings.push_back(fmt::format(
+        "{}: elevations are the numbers that it holds, {:.6g} to {:.6g}, more than any ground is high; where they "
+        "are not metres, give `z_scale` and `z_offset`",
+        info.path, range.min, range.max));
+  }
   if (!is_floating(info.sample_type) || info.z_scale != 1.0 || info.z_offset != 0.0) return;
   if (info.metres_per_vertical_unit > 1.0) return;  // kilometres
   if (range.min >= -0.1 && range.max <= 1.1 && range.max > range.min) {
