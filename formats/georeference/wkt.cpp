@@ -309,6 +309,16 @@ class OldPrj {
     return found == values_.end() ? std::string() : found->second;
   }
 
+  /// Of degrees; empty where neither datum nor spheroid is known.
+  [[nodiscard]] std::string geographic() const {
+    static const std::map<std::string, const char*> kCodes = {
+        {"NAD83", "EPSG:4269"}, {"NAD27", "EPSG:4267"}, {"WGS72", "EPSG:4322"}};
+    const auto known = kCodes.find(value("DATUM"));
+    if (known != kCodes.end()) return known->second;
+    const std::string figure = figure_of();
+    return figure.empty() ? figure : "+proj=longlat " + figure;
+  }
+
   /// Of what is no geographic system; empty where it is none that is known.
   [[nodiscard]] std::string proj_string() const {
     const std::string kind = value("PROJECTION");
@@ -335,6 +345,17 @@ class OldPrj {
       }
       if (kind == "POLAR") text += parameters_[1] < 0.0 ? " +lat_0=-90" : " +lat_0=90";
     }
+    const std::string figure = figure_of();
+    if (figure.empty()) return {};
+    text += ' ' + figure;
+    const std::string units = value("UNITS");
+    if (units == "FEET") return text + " +units=us-ft";
+    return units == "METERS" || units.empty() ? text + " +units=m" : std::string();
+  }
+
+ private:
+  /// The datum, else the spheroid, as PROJ's parameters; empty where neither is known.
+  [[nodiscard]] std::string figure_of() const {
     const std::string datum = value("DATUM");
     static const std::map<std::string, const char*> kDatums = {
         {"WGS84", "+datum=WGS84"}, {"NAD83", "+datum=NAD83"}, {"NAD27", "+datum=NAD27"}, {"WGS72", "+ellps=WGS72"}};
@@ -345,15 +366,9 @@ class OldPrj {
                                                                   {"BESSEL", "+ellps=bessel"}};
     const auto by_datum = kDatums.find(datum);
     const auto by_spheroid = kSpheroids.find(value("SPHEROID"));
-    if (by_datum == kDatums.end() && by_spheroid == kSpheroids.end()) return {};
-    text += ' ';
-    text += by_datum != kDatums.end() ? by_datum->second : by_spheroid->second;
-    const std::string units = value("UNITS");
-    if (units == "FEET") return text + " +units=us-ft";
-    return units == "METERS" || units.empty() ? text + " +units=m" : std::string();
+    if (by_datum != kDatums.end()) return by_datum->second;
+    return by_spheroid != kSpheroids.end() ? by_spheroid->second : "";
   }
-
- private:
   static bool is_number(const std::string& word) {
     return word.find_first_not_of("+-0123456789.") == std::string::npos &&
            word.find_first_of("0123456789") != std::string::npos;
@@ -386,7 +401,16 @@ bool read_old_prj(std::string_view text, SourceInfo& info) {
   }
   if (prj.value("UNITS") != "DD") return false;
   info.georeference.unit = HorizontalUnit::kDegree;
-  if (prj.value("DATUM") == "WGS84") info.georeference.system = wgs84_system();
+  if (prj.value("DATUM") == "WGS84") {
+    info.georeference.system = wgs84_system();
+  } else if (const std::string system = prj.geographic(); !system.empty()) {
+    try {
+      take_system(system, info);
+    } catch (const Error& error) {
+      info.warnings.push_back(
+          loss(fmt::format("its .prj says degrees, of a datum that is not kept: {}", error.what())));
+    }
+  }
   return true;
 }
 

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <numbers>
+#include <string_view>
 #include <tuple>
 
 #include "formats/files/text.h"
@@ -176,7 +178,10 @@ class CfReader {
       const auto [first, last] = ends_of(*rows, static_cast<std::uint64_t>(info_.height));
       return last > first;
     }
-    if (dimension.starts_with("phony_dim_")) return false;  // libnetcdf's name for those of HDF5, which has none
+    // libnetcdf's name for those of HDF5, which has none: GDAL takes it for netCDF, and begins in the South, by the file's name.
+    static constexpr std::array<std::string_view, 7> kNames = {".nc", ".nc2", ".nc3", ".nc4", ".cdf", ".grd", ".gmac"};
+    const std::string extension = lower_case(std::filesystem::path(info_.path).extension().string());
+    if (dimension.starts_with("phony_dim_") && std::ranges::find(kNames, extension) == kNames.end()) return false;
     info_.warnings.emplace_back(
         "its rows have no coordinates: the first is taken for the southernmost, as GDAL and GMT take it");
     return true;

@@ -332,9 +332,8 @@ TEST_F(CylindricalMoon, ThatGoesRoundIsOfferedNoRemedyThatIsRefused) {
   request.wrap_x = true;
   EXPECT_THAT(
       error_of([&] { (void)make_source_frame(info, request); }).what(),
-      HasSubstr(
-          "needs columns all the way round, 10916406.1527 of the input's coordinates; its 437 columns 25000 apart "
-          "make 10925000"));
+      HasSubstr("needs columns all the way round, 10916406.1527 of its map; this input's 437 columns 25000 apart "
+                "make 10925000"));
 }
 
 /// Files of neighbouring zones are of one resolution, whatever their maps' scales.
@@ -680,6 +679,9 @@ TEST_F(UnderstandSystem, KeywordsOfArcInfoAreTheSystemThatTheySpell) {
   EXPECT_TRUE(is("Projection    UTM\nZone          11\nDatum         NAD27\nUnits         METERS\nParameters\n",
                  "+proj=utm +zone=11 +datum=NAD27"));
   EXPECT_TRUE(is("Projection UTM\nZone -33\nDatum WGS84\nUnits METERS\n", "EPSG:32733"));
+  EXPECT_EQ(read_as_prj("Projection GEOGRAPHIC\nDatum NAD83\nSpheroid GRS80\nUnits DD\n").georeference.system.epsg,
+            4269);
+  EXPECT_TRUE(is("Projection GEOGRAPHIC\nSpheroid CLARKE1866\nUnits DD\n", "+proj=longlat +ellps=clrk66"));
   const std::string albers =
       "Projection ALBERS\r\nDatum NAD83\r\nUnits METERS\r\nParameters\r\n29 30 0.000 /* 1st standard parallel\r\n"
       "45 30 0.000 /* 2nd standard parallel\r\n-96 0 0.0 /* central meridian\r\n23 0 0.0 /* latitude of origin\r\n"

@@ -301,6 +301,20 @@ TEST_F(Netcdf4, RowsFromTheSouthAreTurned) {
   }
 }
 
+/// h5py's array of 3 x 4 without names of dimensions: GDAL reads it as netCDF, rows from the South, or as HDF5 by its name.
+TEST_F(Netcdf4, RowsOfHdf5WithoutNamesBeginInTheSouthWhereTheFileIsCalledNetcdf) {
+  const TemporaryFolder folder;
+  const std::vector<double> rising = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11};
+  for (const auto& [name, first] : {std::pair("a.h5", 0.0), {"a.nc", 8.0}, {"b.NC4", 8.0}}) {
+    const std::string path = folder / name;
+    std::filesystem::copy_file(file("unnamed.h5"), path);
+    const std::vector<double> values = values_of(*open_raster(path, {}));
+    ASSERT_EQ(values.size(), rising.size());
+    EXPECT_EQ(values.front(), first) << name;
+    EXPECT_EQ(values[8], 8.0 - first) << name;
+  }
+}
+
 TEST_F(Netcdf4, LongitudesMayComeBeforeLatitudes) {
   const auto source = open_raster(file("lon_lat.nc"), {});
   const SourceInfo& info = source->info();

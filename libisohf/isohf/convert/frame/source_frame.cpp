@@ -276,10 +276,11 @@ SourceFrame make_source_frame(const SourceInfo& info, const GroundRequest& reque
           "this one's are not; leave the option out, or bring it to degrees (gdalwarp)");
     }
     if (closure_of(info, map) != Closure::kClosed) {
+      const bool in_degrees = place.unit == HorizontalUnit::kDegree;
       refuse_source(fmt::format(
-          "{}: `wrap_x` needs columns all the way round, {:.12g} of the input's coordinates; its {} "
-          "columns {:.12g} apart make {:.12g}",
-          info.path, *turn, info.width, place.spacing_x, static_cast<double>(info.width) * place.spacing_x));
+          "{}: `wrap_x` needs columns all the way round, {}; this input's {} columns {:.12g} apart make {:.12g}",
+          info.path, in_degrees ? "360 degrees" : fmt::format("{:.12g} of its map", *turn), info.width, place.spacing_x,
+          static_cast<double>(info.width) * place.spacing_x));
     }
     frame.wraps_x = true;
   }
