@@ -27,3 +27,4 @@ configure_file(cmake/isohf.pc.in ${PROJECT_BINARY_DIR}/isohf.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/isohf.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
 
 install(DIRECTORY docs/schema DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT programs FILES_MATCHING PATTERN "*.json" PATTERN "README.md")
+install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT development FILES_MATCHING PATTERN "*.cpp" PATTERN "CMakeLists.txt")

@@ -1014,7 +1014,12 @@ def main(path, samples=None):
 
 
 if __name__ == "__main__":
+    if len(sys.argv) not in (2, 3):
+        print("usage: reader.py ARCHIVE [SAMPLES]", file=sys.stderr)
+        sys.exit(2)
     try:
         main(*sys.argv[1:])
+    except OSError as error:
+        sys.exit(str(error))
     except (Refused, ValueError, LookupError, TypeError, struct.error, OverflowError) as refusal:
         sys.exit("%s: refused: %s" % (sys.argv[1], refusal))

@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
     const isohf::ArchiveReader archive(argv[1]);
     isohf::Surface surface(archive);
     std::ifstream points(argv[2]);
+    if (!points) return std::fprintf(stderr, "%s: cannot be opened\n", argv[2]), 1;
     for (isohf::WorldPoint point{}; points >> point.x >> point.z;) {
       const isohf::SurfaceSample found = surface.at(point);
       switch (found.state) {
@@ -26,6 +27,7 @@ int main(int argc, char** argv) {
           break;
       }
     }
+    if (!points.eof()) return std::fprintf(stderr, "%s: holds what is no number\n", argv[2]), 1;
     return 0;
   } catch (const isohf::Error& error) {
     std::fprintf(stderr, "%s\n", error.what());

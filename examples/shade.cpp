@@ -20,8 +20,9 @@ int main(int argc, char** argv) {
         file.write(reinterpret_cast<const char*>(picture.pixel(column, row)), 3);  // without alpha
       }
     }
+    if (!file.flush()) return std::fprintf(stderr, "%s: cannot be written\n", argv[2]), 1;
     std::printf("%d x %d pixels\n", picture.width, picture.height);
-    return file.flush() ? 0 : 1;
+    return 0;
   } catch (const isohf::Error& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

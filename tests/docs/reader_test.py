@@ -42,6 +42,11 @@ def read(archive, samples=None):
 
 
 failures = 0
+for arguments, expected in ([], "usage: reader.py ARCHIVE [SAMPLES]"), (["/no/archive"], "/no/archive"):
+    said = subprocess.run([sys.executable, root / "docs" / "reader.py"] + arguments, capture_output=True, text=True, check=False)
+    if said.returncode == 0 or expected not in said.stderr or said.stderr.count("\n") != 1:
+        print(arguments, said.stdout, said.stderr)
+        failures += 1
 with tempfile.TemporaryDirectory() as name:
     folder = pathlib.Path(name)
     for source, options in cases(folder):

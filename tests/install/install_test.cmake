@@ -1,5 +1,4 @@
-# cmake -DBINARY_DIR=... -DSOURCE_DIR=... -DWORK_DIR=... -DLIBDIR=... -DCXX=... -DEXAMPLES_DIR=... -DRASTER=...
-#       -P install_test.cmake
+# cmake -DBINARY_DIR=... -DSOURCE_DIR=... -DWORK_DIR=... -DLIBDIR=... -DCXX=... -DRASTER=... -P install_test.cmake
 # Installs into a folder of its own, then builds and runs the examples on it, by CMake and by pkg-config.
 function(run)
   execute_process(COMMAND ${ARGV} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
@@ -26,9 +25,10 @@ file(WRITE ${WORK_DIR}/says/CMakeLists.txt
      "cmake_minimum_required(VERSION 3.25)\nproject(says CXX)\nfind_package(isohf REQUIRED)\n"
      "file(WRITE ${WORK_DIR}/module_folder.txt \${isohf_MODULE_FOLDER})\n")
 run(${CMAKE_COMMAND} -S ${WORK_DIR}/says -B ${WORK_DIR}/says -DCMAKE_PREFIX_PATH=${prefix})
-file(COPY ${EXAMPLES_DIR} DESTINATION ${WORK_DIR})
+# As they are installed, with nothing else of the tree beside them.
+file(COPY ${prefix}/share/doc/isohf/examples DESTINATION ${WORK_DIR})
 run(${CMAKE_COMMAND} -S ${WORK_DIR}/examples -B ${WORK_DIR}/build -DCMAKE_PREFIX_PATH=${prefix}
-    -DCMAKE_CXX_COMPILER=${CXX} -DISOHF_EXAMPLE_RASTER=${RASTER})
+    -DCMAKE_CXX_COMPILER=${CXX})
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
 run(${CMAKE_CTEST_COMMAND} --test-dir ${WORK_DIR}/build --output-on-failure)
 
@@ -48,7 +48,7 @@ endforeach()
 execute_process(COMMAND pkg-config --cflags --libs isohf OUTPUT_VARIABLE flags
                 COMMAND_ERROR_IS_FATAL ANY OUTPUT_STRIP_TRAILING_WHITESPACE)
 separate_arguments(flags UNIX_COMMAND "${flags}")
-run(${CXX} ${EXAMPLES_DIR}/convert.cpp -o ${WORK_DIR}/by_pkg_config ${flags})
+run(${CXX} ${prefix}/share/doc/isohf/examples/convert.cpp -o ${WORK_DIR}/by_pkg_config ${flags})
 run(${WORK_DIR}/by_pkg_config ${RASTER} ${WORK_DIR}/by_pkg_config.isohf)
 
 file(REMOVE_RECURSE ${WORK_DIR})
