@@ -54,6 +54,8 @@ endif()
 # warnings; scripts/check finds names that two sources of a folder have for themselves.
 function(isohf_compile target)
   target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:isohf_precompiled>)
+  # What a program says of a broken invariant names the source in this tree, not a folder of the machine that built it.
+  target_compile_options(${target} PRIVATE -fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=)
   target_precompile_headers(${target} PRIVATE <algorithm> <array> <cmath> <cstdint> <functional> <memory> <optional> <span>
                             <string> <utility> <vector> <fmt/format.h> ${ARGN})
   if(NOT CMAKE_CXX_COMPILER_LAUNCHER AND NOT CMAKE_DISABLE_PRECOMPILE_HEADERS)
