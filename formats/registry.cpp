@@ -18,6 +18,7 @@
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "isohf/base/file.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/base/void_values.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -192,7 +193,7 @@ void check_numbers(const SourceInfo& info) {
   }
 }
 
-/// A raster whose file stays as it is while it is read: of one that another program writes, part would be old and part
+/// What open_raster() hands out: its windows are held against the raster, once for all readers. A raster whose file stays as it is while it is read: of one that another program writes, part would be old and part
 /// new, or not there yet.
 class UnchangedSource final : public HeightSource {
  public:
@@ -205,6 +206,7 @@ class UnchangedSource final : public HeightSource {
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
   void read_window(const Window& window, std::span<std::byte> samples) override {
+    require_window(info_.path, info_.width, info_.height, window, size_bytes(info_.sample_type), samples.size());
     source_->read_window(window, samples);
     require_unchanged(info_.path, stamp_);
     check_elevations(samples);
@@ -237,17 +239,7 @@ class UnchangedSource final : public HeightSource {
 
   /// No ground is beyond a pole: degrees there are no degrees, or a part of the raster is margin.
   void warn_of_latitudes() {
-    const Georeference& place = info_.georeference;
-    if (place.unit != HorizontalUnit::kDegree || !place.has_origin) return;
-    constexpr double kPole = 90.0;
-    const double north = place.origin_y;
-    const double south = north - static_cast<double>(info_.height - 1) * place.spacing_y;
-    const double beyond = kPole + 0.01 * place.spacing_y;
-    if (north <= beyond && south >= -beyond) return;
-    info_.warnings.push_back(
-        fmt::format("its rows lie at latitudes from {:.10g} to {:.10g}, and there is no ground beyond 90: `bbox` "
-                    "leaves rows out, `reference_system` says what else its coordinates are",
-                    south, north));
+    if (std::string text = latitude_warning(info_); !text.empty()) info_.warnings.emplace_back(std::move(text));
   }
 
   /// Numbers that no elevation is, and that no void value or range declares: one of them would stretch the codes of all
@@ -354,6 +346,8 @@ std::unique_ptr<HeightSource> open_by_head(const std::string& path, const OpenOp
 }  // namespace
 
 std::unique_ptr<HeightSource> open_raster(const std::string& path, const OpenOptions& options) {
+  require_known("`registration`", options.registration.value_or(Registration::kPoint), Registration::kPoint);
+  if (options.raw) require_known("`raw`: its type", options.raw->type, SampleType::kFloat64);
   try {
     const FileStamp named = FileStamp::of(path);
     std::unique_ptr<HeightSource> source = open_by_head(path, options);

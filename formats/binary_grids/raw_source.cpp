@@ -17,6 +17,7 @@
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/raster_description.h"
 #include "formats/open_options.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -95,6 +96,11 @@ class RawSource final : public PlainSource {
             const OpenOptions& options)
       : PlainSource(path, "raw samples", options) {
     (void)choose_band(info_, options, 1);
+    try {
+      require_size("raw samples", layout.width, layout.height);
+    } catch (const Error& error) {
+      throw Error(description != nullptr ? ErrorCode::kCorrupt : error.code(), path + ": " + error.what());
+    }
     info_.width = layout.width;
     info_.height = layout.height;
     info_.sample_type = layout.type;

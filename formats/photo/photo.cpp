@@ -15,7 +15,7 @@
 #include "formats/files/raw_file.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/readers.h"
-#include "isohf/base/assert.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/surface/photo/srgb.h"
@@ -47,8 +47,8 @@ class CachedPhoto final : public PhotoSource {
   }
 
   void read_window(const Window& window, std::span<std::uint8_t> samples) override {
-    ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0 &&
-                 window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
+    require_window(info_.path, info_.width, info_.height, window, static_cast<std::size_t>(info_.channels),
+                   samples.size());
     if (samples.empty()) return;
     const auto channels = static_cast<std::size_t>(info_.channels);
     const std::size_t out_bytes = static_cast<std::size_t>(window.columns) * channels;

@@ -315,7 +315,8 @@ TEST(FilledSource, GivesTheStoredSamplesWhenAsked) {
 TEST(FilledSource, RefusesWhatMakesNoSense) {
   const auto refused = [](const VoidTreatment& treatment) {
     try {
-      Filled<float>(SampleType::kFloat32, 4, 4, treatment, [](std::int64_t, std::int64_t) { return 0.0; });
+      (void)with_voids_treated(
+          std::make_unique<MemorySource<float>>(SampleType::kFloat32, 4, 4, [](auto, auto) { return 0.0; }), treatment);
     } catch (const Error& error) {
       return error.code() == ErrorCode::kInvalidArgument;
     }

@@ -18,6 +18,7 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/journal.h"
+#include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
 #include "isohf/base/output_file.h"
@@ -515,6 +516,20 @@ const std::string& ArchiveWriter::content_hash(const Metadata& metadata) {
   return state.content_hash;
 }
 
+/// What callers say of source and conversion goes into metadata that no reader may refuse.
+void require_readable(const std::string& json) {
+  try {
+    if (json.size() > kMaxMetadataBytes) {
+      throw Error(ErrorCode::kCorrupt,
+                  fmt::format("metadata: {} bytes, at most {} can be read", json.size(), kMaxMetadataBytes));
+    }
+    (void)accuracy_info(parse_metadata(json));
+  } catch (const Error& error) {
+    throw Error(ErrorCode::kInvalidArgument,
+                std::string("what is asked for makes an archive that cannot be read: ") + error.what());
+  }
+}
+
 void ArchiveWriter::complete(Metadata metadata) {
   State& state = *state_;
   ISOHF_ASSERT(!state.finished);
@@ -533,6 +548,7 @@ void ArchiveWriter::complete(Metadata metadata) {
   std::erase_if(metadata.extensions, [](const auto& extension) { return extension.first == kDataCrcName; });
   metadata.extensions.emplace_back(kDataCrcName, fmt::format("\"{:08x}\"", state.contents.data_crc32()));
   const std::string json = format_metadata(metadata) + "\n";
+  require_readable(json);
   const auto data = std::as_bytes(std::span<const char>(json));
   state.named([&] {
     const ZipMember index = state.contents.append_index(state.part);

@@ -16,6 +16,7 @@
 #include <thread>
 #include <vector>
 
+#include "isohf/base/handed_in.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -109,7 +110,8 @@ Arena::Arena(const Job& job) : threads_(std::make_unique<Threads>(possible_threa
 Arena::~Arena() = default;
 
 void Arena::execute(const std::function<void()>& work) {
-  threads_->arena.execute(work);
+  // What takes long runs here: memory that there is not is told as anything else that goes wrong.
+  or_out_of_memory({}, [&] { threads_->arena.execute(work); });
 }
 
 }  // namespace isohf

@@ -262,8 +262,9 @@ bool is_density_free(const PlanRequest& request) {
 }
 
 /// Plans in the order of their cost.
-std::vector<Plan> plans_for(const SourceInfo& info, PlanRequest request) {
-  const Plan first = make_plan(info, request);
+std::vector<Plan> plans_for(const SourceInfo& info, const ConvertOptions& options) {
+  PlanRequest request = options.plan;
+  const Plan first = plan_conversion(info, options);
   if (!is_density_free(request)) return {first};
   std::vector<Plan> plans;
   const bool can_meet_samples = !first.frame.warp && !first.frame.wraps_x && !request.fit;
@@ -302,7 +303,7 @@ ConvertSummary convert_within(HeightSource& source, const std::string& output, c
   const SourceInfo& info = source.info();
   const double most = *options.max_error;
   const bool chooses_density = is_density_free(options.plan);
-  const std::vector<Plan> plans = plans_for(info, options.plan);
+  const std::vector<Plan> plans = plans_for(info, options);
   std::vector<Filter> filters = {options.filter.value_or(kDefaultFilter)};
   if (!options.filter) filters.push_back(Filter::kBspline3);
   const double step = expected_step(info, options);
@@ -373,11 +374,8 @@ ConvertSummary convert_within(HeightSource& source, const std::string& output, c
 }  // namespace
 
 ConvertSummary convert(HeightSource& source, const std::string& output, const ConvertOptions& options, const Job& job) {
-  if (options.max_error && !(std::isfinite(*options.max_error) && *options.max_error > 0.0)) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("`max_error` is {}, must be above 0", *options.max_error));
-  }
   if (options.max_error) return convert_within(source, output, options, job);
-  return run_conversion(source, make_plan(source.info(), options.plan), output, options, job).summary;
+  return run_conversion(source, plan_conversion(source.info(), options), output, options, job).summary;
 }
 
 std::optional<ErrorEstimate> estimate_error(HeightSource& source, const ConvertOptions& options, const Job& job) {
@@ -385,7 +383,7 @@ std::optional<ErrorEstimate> estimate_error(HeightSource& source, const ConvertO
   // These are unpacked from their first sample on, or look far around each window.
   const bool is_slow = info.fill_distance > 0 || info.format == "PNG" || info.path.ends_with(".gz");
   if ((is_slow && info.width * info.height > kSmall) || job.memory_bytes != 0) return std::nullopt;
-  const Plan plan = make_plan(info, options.plan);
+  const Plan plan = plan_conversion(info, options);
   Sums sums;
   Job alone;
   alone.threads = 1;  // not worth more

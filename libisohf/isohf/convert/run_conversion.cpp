@@ -19,6 +19,7 @@
 #include "isohf/archive/writer.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/assert.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/base/memory/memory_budget.h"
 #include "isohf/convert/conversion.h"
 #include "isohf/convert/frame/plan.h"
@@ -222,11 +223,31 @@ TilesAround make_around(const Conversion& conversion, const ShardWork& shard, co
   return {conversion, north, south};
 }
 
-void check_range(const std::pair<double, double>& range) {
-  if (!(std::isfinite(range.first) && std::isfinite(range.second) && range.first < range.second)) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("`z_range` is {}:{}, must be two numbers, the smaller first", range.first, range.second));
+void check(const ConvertOptions& options) {
+  const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, why); };
+  require_known("`code_type`", options.code_type, CodeType::kF32);
+  require_known("filter", options.filter.value_or(kDefaultFilter), Filter::kLanczos6);
+  (void)with_taps(options.acquisition);
+  if (options.level < kMinLevel || options.level > kMaxLevel) {
+    refuse(fmt::format("level is {}, must be {} to {}", options.level, kMinLevel, kMaxLevel));
   }
+  if (options.z_range) {
+    const auto [low, high] = *options.z_range;
+    if (!(low < high && std::isfinite(high - low)))
+      refuse(fmt::format("`z_range` is {}:{}, must be two numbers, the smaller first", low, high));
+  }
+  if (options.step && !(std::isfinite(*options.step) && *options.step >= 0.0))
+    refuse(fmt::format("step is {}, must be positive, or 0 for the finest", *options.step));
+  const auto check_positive = [&](const char* what, const std::optional<double>& value) {
+    if (value && !(std::isfinite(*value) && *value > 0.0))
+      refuse(fmt::format("{} is {}, must be above 0", what, *value));
+  };
+  check_positive("`max_rounding`", options.max_rounding);
+  check_positive("`max_error`", options.max_error);
+  if (options.step && options.max_rounding) refuse("both `step` and `max_rounding` are given; give one");
+  if (!options.texture) return;
+  if (options.texture->photo == nullptr) refuse("`texture` has no photo");
+  require_known("`texture`: its format", options.texture->format.value_or(TextureFormat::kPng), TextureFormat::kJpeg);
 }
 
 void refuse_warnings(const ConvertSummary& summary, const ConvertOptions& options) {
@@ -237,6 +258,12 @@ void refuse_warnings(const ConvertSummary& summary, const ConvertOptions& option
 void warn_of_plan(const SourceInfo& info, const Plan& plan, const PlanRequest& request, const TextureStage* textures,
                   std::vector<Warning>& warnings) {
   warnings = info.warnings;
+  // A reader of ours has said so, perhaps of more rows.
+  const auto is_of_latitudes = [](const Warning& warning) {
+    return warning.find("no ground beyond 90") != std::string::npos;
+  };
+  if (std::string text = latitude_warning(info); !text.empty() && std::ranges::none_of(warnings, is_of_latitudes))
+    warnings.emplace_back(info.path + ": " + std::move(text));
   if (std::string text = scale_warning(info, plan.frame, request.ground.projection); !text.empty()) {
     warnings.emplace_back(std::move(text));
   }
@@ -288,13 +315,17 @@ AccuracyInfo info_of(const AccuracyReport& report, const ConvertOptions& options
 
 }  // namespace
 
+Plan plan_conversion(const SourceInfo& info, const ConvertOptions& options) {
+  check(options);
+  return make_plan(info, options.plan);
+}
+
 namespace {
 
 /// The codes of a conversion that writes nothing, after `look`.
 template <typename Look>
 ShardPlan::Codes before_writing(HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job,
                                 Look look) {
-  if (options.z_range) check_range(*options.z_range);
   if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
   const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));
   const MemoryPlan memory = plan_memory(source, plan, options, job, 0);
@@ -348,12 +379,9 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
                                 const ConvertOptions& options, const Job& job, bool is_retry, const ShardWork* shard) {
   const auto start = std::chrono::steady_clock::now();
   const SourceInfo& info = source.info();
-  if (options.z_range) check_range(*options.z_range);
   if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
   std::optional<TextureStage> textures;
   if (options.texture) {
-    if (options.texture->photo == nullptr)
-      throw Error(ErrorCode::kInvalidArgument, info.path + ": `texture` has no photo");
     textures.emplace(TextureStage::make(plan, info, *options.texture, threads_of(job), textured_tiles_in_flight(job)));
   }
   const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));

@@ -29,6 +29,9 @@ struct ShardWork {
       false;  ///< each row of the first plane is above tiles of one shard, which makes it as the whole has it
 };
 
+/// make_plan() for a conversion: refuses options that none can have.
+[[nodiscard]] Plan plan_conversion(const SourceInfo& info, const ConvertOptions& options);
+
 /// Codes alone: the first pass over the source, where one is needed. `plan` must be made of options.plan.
 [[nodiscard]] ShardPlan::Codes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options,
                                           const Job& job, std::vector<Warning>& warnings);

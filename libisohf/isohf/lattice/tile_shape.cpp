@@ -7,6 +7,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "isohf/base/handed_in.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -16,6 +17,12 @@ constexpr double kSin60 = std::numbers::sqrt3 / 2.0;
 
 int coarsest_stride(int levels) {
   return 1 << (levels - 1);
+}
+
+void require_level(const TileShape& shape, int level) {
+  if (level >= 0 && level < shape.levels()) return;
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("level {} of a tile is asked for, it has 0 to {}", level, shape.levels() - 1));
 }
 
 /// The multiple of `step` that is nearest to `value` and lies in [step, limit]; ties upwards.
@@ -75,17 +82,20 @@ std::int64_t TileShape::triangle_count() const {
 }
 
 std::int64_t TileShape::strip_index_count(int level) const {
+  require_level(*this, level);
   // Eq. 3 as the appendix evaluates it: pairs of rows times (indices a pair), less the three that the last row omits.
   const std::int64_t stride = std::int64_t{1} << level;
   return (rows_ - 3) / (2 * stride) * ((columns_ - 4) * 4 / stride + 10) - 3;
 }
 
 std::int64_t TileShape::strip_triangle_count(int level) const {
+  require_level(*this, level);
   const std::int64_t stride = std::int64_t{1} << level;
   return ((columns_ - 4) * 2 / stride + 1) * ((rows_ - 3) / stride);
 }
 
 std::int64_t TileShape::stitch_triangle_count(int level) const {
+  require_level(*this, level);
   // Eq. 5, (R+C-7)(2 - 2^(1-level)), in integers: the sum over k = 1..level of (R+C-7)/2^(k-1).
   std::int64_t count = 0;
   for (int k = 1; k <= level; ++k) count += (rows_ + columns_ - 7) >> (k - 1);
@@ -147,6 +157,7 @@ std::vector<TileShape> find_shapes(int levels, const ShapeBudget& budget, double
   if (levels < 1 || levels > kMaxTileLevels) {
     refuse(fmt::format("levels is {}, must lie in 1..{}", levels, kMaxTileLevels));
   }
+  require_known("tile budget: its kind", budget.kind, ShapeBudget::Kind::kVertices);
   if (budget.count < 1) refuse(fmt::format("tile budget is {}, must be at least 1", budget.count));
   if (!(tolerance >= 0.0)) refuse(fmt::format("tile budget tolerance is {}, must be at least 0", tolerance));
   const auto wanted = static_cast<double>(budget.count);

@@ -10,6 +10,7 @@
 
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/base/assert.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
 #include "isohf/surface/resample/kernels.h"
@@ -57,11 +58,14 @@ const SampleGrid& require_samples_near(const SampleGrid& samples, const TileGrid
 }
 
 void require_samples(const SampleGrid& grid) {
-  if (grid.width < 1 || grid.height < 1 || !(grid.spacing_x > 0.0) || !(grid.spacing_z > 0.0)) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("a grid of {}x{} samples {} x {} apart, must have at least one and positive spacing",
-                            grid.width, grid.height, grid.spacing_x, grid.spacing_z));
-  }
+  require_size("a grid", grid.width, grid.height);
+  const auto is_length = [](double value) { return value > 0.0 && std::isfinite(value); };
+  if (is_length(grid.spacing_x) && is_length(grid.spacing_z) && std::isfinite(grid.first_x) &&
+      std::isfinite(grid.first_z))
+    return;
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("a grid of samples {} x {} apart from ({}, {}) on, must have spacings above 0 and a place",
+                          grid.spacing_x, grid.spacing_z, grid.first_x, grid.first_z));
 }
 
 /// Some columns of the samples, and of the lattice rows that they are made of.

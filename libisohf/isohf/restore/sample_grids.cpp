@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "isohf/archive/metadata/part_record.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/error.h"
 #include "isohf/projection/projected_extent.h"
 #include "isohf/projection/projection_wkt.h"
@@ -433,8 +434,19 @@ SampleGrid natural_grid(const Metadata& metadata) {
   return *part;
 }
 
+namespace {
+
+void require_spacing(const std::optional<double>& spacing) {
+  if (spacing && !(*spacing > 0.0 && std::isfinite(*spacing)))
+    refuse(fmt::format("`spacing` is {}, must be above 0", *spacing));
+}
+
+}  // namespace
+
 SampleGrid grid_over(const WorldBounds& ground, bool areas, const std::optional<GridSize>& size,
                      const std::optional<double>& spacing) {
+  if (!size && !spacing) refuse("a grid needs `size` or `spacing`");
+  require_spacing(spacing);
   const double width = ground.x1 - ground.x0;
   const double height = ground.z1 - ground.z0;
   // Posts on the ground, and areas whose middle lies on it.
@@ -443,6 +455,9 @@ SampleGrid grid_over(const WorldBounds& ground, bool areas, const std::optional<
       refuse(fmt::format("`spacing` of {:.6g} is wider than the ground, {:.6g} x {:.6g}", *spacing, width, height));
     }
     const double steps = length / *spacing * (1.0 + 1e-12);
+    if (!(steps < static_cast<double>(kMaxSide))) {
+      refuse(fmt::format("`spacing` of {:.6g} makes too many samples of {:.6g} x {:.6g}", *spacing, width, height));
+    }
     return std::max<std::int64_t>(static_cast<std::int64_t>(areas ? std::ceil(steps - 0.5) : std::floor(steps) + 1.0),
                                   1);
   };
@@ -453,6 +468,7 @@ SampleGrid grid_over(const WorldBounds& ground, bool areas, const std::optional<
   SampleGrid grid;
   grid.width = size ? size->first : count(width);
   grid.height = size ? size->second : count(height);
+  require_size("a grid", grid.width, grid.height);
   grid.spacing_x = step(width, grid.width);
   grid.spacing_z = step(height, grid.height);
   grid.first_x = ground.x0 + (areas ? grid.spacing_x / 2.0 : 0.0);
@@ -510,6 +526,9 @@ std::optional<SampleGrid> own_grid_in_box(const Metadata& metadata, const GridSy
 
 SampleGrid grid_in_system(const Metadata& metadata, const WorldBounds& ground, std::shared_ptr<const GridSystem> system,
                           const std::optional<GridSize>& size, const std::optional<double>& spacing) {
+  if (!system || !system->map) refuse("there is no reference system for the grid; see understand_grid_system()");
+  require_spacing(spacing);
+  if (size) require_size("a grid", size->first, size->second);
   const Georeference& place = system->place;
   const std::optional<Georeference> own = grid_georeference(metadata, natural_grid(metadata));
   const bool is_own = place.has_origin && own && own->origin_x == place.origin_x && own->origin_y == place.origin_y;

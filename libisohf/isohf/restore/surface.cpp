@@ -11,6 +11,7 @@
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/assert.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/base/memory/memory_budget.h"
 #include "isohf/error.h"
 #include "isohf/restore/grid_sampler.h"
@@ -88,6 +89,10 @@ SampleGrid places_of(const SampleGrid& grid, const GridSize& parts) {
   return places;
 }
 
+std::string grid_name(const SampleGrid& grid) {
+  return fmt::format("a grid of {} x {} samples", grid.width, grid.height);
+}
+
 void require_as_many(std::size_t samples, std::size_t points) {
   if (samples == points) return;
   throw Error(ErrorCode::kInvalidArgument,
@@ -103,7 +108,7 @@ struct Surface::State {
         sampler(archive.grid(), archive.metadata().quantisation, tiles_of(archive),
                 job.memory_bytes > 0 ? job.memory_bytes : kDefaultMemory),
         georeference(archive.metadata()) {
-    if (job.threads > 0) arena.emplace(job);
+    if (job.threads != 0) arena.emplace(job);
   }
 
   template <typename Found>
@@ -186,6 +191,9 @@ struct RowReader::State {
       : grid(its_grid) {
     const Metadata& metadata = archive.metadata();
     require_samples(grid);
+    require_known("the method", method, RestoreMethod::kAverage);
+    if (grid.system && !grid.system->map)
+      throw Error(ErrorCode::kInvalidArgument, "the grid's reference system has no map; see understand_grid_system()");
     if (method == RestoreMethod::kAverage) {
       parts = parts_of(metadata, grid);
       places = std::make_unique<RowReader>(archive, places_of(grid, parts), RestoreMethod::kBarycentric, job);
@@ -282,7 +290,7 @@ struct RowReader::State {
 };
 
 RowReader::RowReader(const ArchiveReader& archive, const SampleGrid& grid, RestoreMethod method, const Job& job)
-    : state_(std::make_unique<State>(archive, grid, method, job)) {}
+    : state_(or_out_of_memory(grid_name(grid), [&] { return std::make_unique<State>(archive, grid, method, job); })) {}
 
 RowReader::~RowReader() = default;
 
@@ -291,21 +299,25 @@ void RowReader::read(std::int64_t first, std::int64_t rows, std::span<double> el
   if (rows < 0 || first < state_->next_row || first > grid.height || rows > grid.height - first) {
     throw Error(
         ErrorCode::kInvalidArgument,
-        fmt::format("rows {} to {} - 1 are asked for, must be rows of {} to {} - 1: calls come in increasing order",
-                    first, first + rows, state_->next_row, grid.height));
+        fmt::format(
+            "{} rows from row {} on are asked for, of {} the first {} are behind; calls come in increasing order", rows,
+            first, grid.height, state_->next_row));
   }
   require_as_many(elevations.size(), static_cast<std::size_t>(rows * grid.width));
   state_->next_row = first + rows;
-  if (state_->places) {
-    state_->average(first, rows, elevations);
-  } else if (state_->rows) {
-    state_->rows->read(first, rows, elevations);
-  } else {
-    state_->read_by_places(first, rows, elevations);
-  }
+  or_out_of_memory(grid_name(grid), [&] {
+    if (state_->places) {
+      state_->average(first, rows, elevations);
+    } else if (state_->rows) {
+      state_->rows->read(first, rows, elevations);
+    } else {
+      state_->read_by_places(first, rows, elevations);
+    }
+  });
 }
 
 void RowReader::read_all(const Take& take, const Job& job) {
+  require_callback(take);
   const SampleGrid& grid = state_->grid;
   const std::int64_t rows_at_once = state_->rows_at_once;
   Arena(job).execute([&] {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "isohf/base/assert.h"
+#include "isohf/error.h"
 
 namespace isohf {
 
@@ -70,8 +70,7 @@ Severity severity_of(int id) {
   for (const FindingKind& kind : finding_catalogue()) {
     if (kind.id == id) return kind.severity;
   }
-  ISOHF_ASSERT(false);
-  return Severity::kError;
+  throw Error(ErrorCode::kInvalidArgument, "there is no finding " + finding_name(id));
 }
 
 std::string finding_name(int id) {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "isohf/archive/deflate/deflate.h"
-#include "isohf/base/read_ahead.h"
+#include "isohf/base/memory/read_ahead.h"
 #include "isohf/base/source_bytes.h"
 #include "isohf/error.h"
 

@@ -10,7 +10,6 @@
 #include <string_view>
 
 #include "isohf/archive/metadata/json_members.h"
-#include "isohf/base/assert.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -420,7 +419,10 @@ Metadata parse_metadata(const std::string& text) {
 }
 
 TileGrid Metadata::plane_grid(int plane) const {
-  ISOHF_ASSERT(plane >= 0 && plane <= planes.count);
+  if (plane < 0 || plane > planes.count) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("plane {} is asked for, there are 0 to {}", plane, planes.count));
+  }
   std::int64_t columns = grid.tile_columns();
   std::int64_t rows = grid.tile_rows();
   double stride = 1.0;

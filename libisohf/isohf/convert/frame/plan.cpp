@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "isohf/base/assert.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -257,7 +257,6 @@ Lattice square_lattice(const SourceFrame& frame, const PlanRequest& request) {
   double extent_x = extent_for(shape, frame, request);
   double extent_z = extent_x;
   if (request.through_samples) {
-    ISOHF_ASSERT(!frame.warp && !frame.wraps_x && !request.fit && !request.tiles);
     extent_x = shape.cell_columns() * frame.spacing_x;
     extent_z = shape.cell_rows() * frame.spacing_z / 2.0;
   }
@@ -299,6 +298,11 @@ std::string density_warning(const SourceInfo& info, const Plan& plan, const Plan
 }
 
 void check(const PlanRequest& request) {
+  require_known("outside", request.outside, Outside::kVoid);
+  require_known("`projection`", request.ground.projection.kind, ProjectionKind::kSystem);
+  if (request.levels && (*request.levels < 1 || *request.levels > kMaxTileLevels)) {
+    refuse(fmt::format("`levels` is {}, must be 1 to {}", *request.levels, kMaxTileLevels));
+  }
   if ((request.density ? 1 : 0) + (request.spacing ? 1 : 0) + (request.tiles ? 1 : 0) > 1) {
     refuse("more than one of `density`, `spacing` and `tiles` is given; give one");
   }
@@ -326,41 +330,23 @@ double band_rows(const Plan& plan) {
   return most + 2.0;
 }
 
-/// What a source says of itself, which need not be a reader of ours.
-void check(const SourceInfo& info) {
-  const auto require = [&](bool holds, const char* member, double found, const char* required) {
-    if (!holds) refuse(fmt::format("{}: its {} is {}, must be {}", info.path, member, found, required));
-  };
-  const auto is_length = [](double value) { return std::isfinite(value) && value > 0.0; };
-  const Georeference& place = info.georeference;
-  require(std::isfinite(info.z_scale) && info.z_scale != 0.0, "z_scale", info.z_scale, "a number other than 0");
-  require(std::isfinite(info.z_offset), "z_offset", info.z_offset, "a number");
-  require(is_length(info.metres_per_vertical_unit), "vertical unit in metres", info.metres_per_vertical_unit,
-          "above 0");
-  require(is_length(place.metres_per_unit), "horizontal unit in metres", place.metres_per_unit, "above 0");
-  require(is_length(place.spacing_x), "spacing of columns", place.spacing_x, "above 0");
-  require(is_length(place.spacing_y), "spacing of rows", place.spacing_y, "above 0");
-  require(std::isfinite(place.origin_x), "first easting", place.origin_x, "a number");
-  require(std::isfinite(place.origin_y), "first northing", place.origin_y, "a number");
-  require(place.system.epsg.value_or(1) > 0, "EPSG code", place.system.epsg.value_or(1), "above 0");
-  require(place.system.vertical_epsg.value_or(1) > 0, "vertical EPSG code", place.system.vertical_epsg.value_or(1),
-          "above 0");
-  const double axis = place.system.semi_major_axis_m.value_or(1.0);
-  require(is_length(axis), "semi-major axis", axis, "above 0");
-  const double flattening = place.system.inverse_flattening.value_or(0.0);
-  require(std::isfinite(flattening), "inverse flattening", flattening, "a number");
-}
-
 }  // namespace
 
 Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
   check(request);
-  check(info);
+  require_source(info);
   if (info.width < 2 || info.height < 2) {
     throw Error(ErrorCode::kUnsupported,
                 fmt::format("{}: {}x{} samples, a surface needs at least 2x2", info.path, info.width, info.height));
   }
   const SourceFrame frame = make_source_frame(info, request.ground);
+  const bool is_moved = frame.warp || frame.wraps_x || request.fit;
+  if (request.through_samples && (is_moved || request.tiles || request.density || request.spacing)) {
+    refuse(info.path +
+           ": a lattice through the samples goes with none of `fit`, `wrap_x`, `density`, `spacing` and `tiles`, nor "
+           "with a source "
+           "that is projected; leave these out, or it");
+  }
   const bool may_fit =
       !request.shape && !request.budget && !request.density && !request.spacing && !request.through_samples;
   std::optional<Lattice> lattice = may_fit ? fitted_lattice(frame, request) : std::nullopt;

@@ -6,7 +6,7 @@
 #include "isohf/archive.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/archive/writer.h"
-#include "isohf/base/read_ahead.h"
+#include "isohf/base/memory/read_ahead.h"
 #include "isohf/convert/parts/part_file.h"
 #include "isohf/convert/stages/plane_stage.h"
 #include "isohf/convert/stages/seed_row.h"

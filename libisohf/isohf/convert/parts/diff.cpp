@@ -12,6 +12,7 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/metadata/part_record.h"
 #include "isohf/base/arena.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/convert/parts/parts.h"
 #include "isohf/error.h"
 
@@ -139,6 +140,7 @@ ArchiveDifference diff_archives(const std::string& first, const std::string& sec
 
 void subtract_archives(const std::string& first, const std::string& second, const RowReader::Take& take,
                        const Job& job) {
+  require_callback(take);
   constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 18U;
   const ArchiveReader a(first);
   const ArchiveReader b(second);

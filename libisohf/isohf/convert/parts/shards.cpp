@@ -11,6 +11,7 @@
 #include "isohf/archive/metadata/part_record.h"
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/tile_statistics.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/convert/conversion.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/convert/job_description.h"
@@ -90,11 +91,16 @@ TileRange tiles_of_shard(const ShardPlan& plan, int number) {
 /// are no longer what was planned.
 Plan planned(const HeightSource& source, const ShardPlan& plan, int number, const ConvertOptions& options) {
   refuse_what_needs_all(options);
+  // Whoever hands in a plan may have put it together himself: it is held to what one from a file is.
+  if (parse_shard_plan(format_shard_plan(plan)).shards != plan.shards)
+    throw Error(ErrorCode::kInvalidArgument,
+                "plan: its shards do not follow each other from the first row of tiles on");
+  if (plan.codes) require_known("plan: its codes' type", plan.codes->quantisation.type, CodeType::kF32);
   const int count = static_cast<int>(plan.shards.size());
   if (number < 1 || number > count) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("there is no shard {}: the plan has 1 to {}", number, count));
   }
-  Plan whole = make_plan(source.info(), options.plan);
+  Plan whole = plan_conversion(source.info(), options);
   const std::string found = job_of(source.info(), whole, options);
   if (found != plan.job) {
     const auto at = std::mismatch(found.begin(), found.end(), plan.job.begin(), plan.job.end());
@@ -209,7 +215,7 @@ bool holds_plane_rows(const ShardPlan& plan, const PlaneInfo& planes) {
 
 ShardPlan plan_shards(HeightSource& source, const ConvertOptions& options, int shards, const Job& job) {
   ShardPlan plan = draft_shards(source, options, shards);
-  plan.codes = find_codes(source, make_plan(source.info(), options.plan), options, job, plan.warnings);
+  plan.codes = find_codes(source, plan_conversion(source.info(), options), options, job, plan.warnings);
   if (options.lossless) plan.samples_sha256 = hash_of_samples(source.as_stored(), job);
   return plan;
 }
@@ -217,7 +223,7 @@ ShardPlan plan_shards(HeightSource& source, const ConvertOptions& options, int s
 ShardPlan draft_shards(const HeightSource& source, const ConvertOptions& options, int shards) {
   refuse_what_needs_all(options);
   if (shards < 1) throw Error(ErrorCode::kInvalidArgument, fmt::format("{} shards are asked for, at least 1", shards));
-  const Plan plan = make_plan(source.info(), options.plan);
+  const Plan plan = plan_conversion(source.info(), options);
   ShardPlan found;
   found.job = job_of(source.info(), plan, options);
   found.tile_columns = plan.grid.tile_columns();

@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "isohf/archive/textures/picture_codec.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/convert/frame/photo_placement.h"
 #include "isohf/error.h"
 #include "isohf/surface/photo/bordered_photo.h"
@@ -35,6 +36,13 @@ void check(const TextureRequest& request, const PhotoInfo& photo) {
   if (photo.channels != 1 && photo.channels != 3 && photo.channels != 4) {
     throw Error(ErrorCode::kUnsupported,
                 fmt::format("{}: has {} channels; grey, RGB and RGBA are read", photo.path, photo.channels));
+  }
+  require_size(photo.path, photo.width, photo.height);
+  const Georeference place = photo.georeference.value_or(Georeference{});
+  for (const double length : {place.spacing_x, place.spacing_y, place.metres_per_unit}) {
+    if (std::isfinite(length) && length > 0.0) continue;
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: a length of its georeference is {}, must be above 0", photo.path, length));
   }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "isohf/base/handed_in.h"
 #include "isohf/restore/shade/relief.h"
 #include "isohf/surface/photo/srgb.h"
 
@@ -45,6 +46,7 @@ bool is_on(const Metadata& metadata, const char* body) {
 }  // namespace
 
 std::vector<ColourStop> shade_colours(const Metadata& metadata, std::optional<ShadePalette> palette) {
+  require_known("the palette", palette.value_or(ShadePalette::kElevation), ShadePalette::kMars);
   const double low = metadata.statistics.min.value_or(0.0);
   const double high = std::max(metadata.statistics.max.value_or(0.0), low);
   const bool is_earth = is_on(metadata, "Earth");

@@ -15,6 +15,7 @@
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/textures/texture_reader.h"
 #include "isohf/base/arena.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/base/memory/memory_budget.h"
 #include "isohf/base/simd.h"
 #include "isohf/error.h"
@@ -286,6 +287,8 @@ void require(const ShadeOptions& options, const GridSize& size) {
   const auto check = [](bool holds, const char* what) {
     if (!holds) throw Error(ErrorCode::kInvalidArgument, std::string("shade: ") + what);
   };
+  require_known("shade: the kind", options.kind, ShadeKind::kShadowMask);
+  require_known("shade: the palette", options.palette.value_or(ShadePalette::kElevation), ShadePalette::kMars);
   check(size.first >= 1 && size.second >= 1 && size.first <= kMostPixels && size.second <= kMostPixels,
         "the picture must have 1 to 2^20 pixels a side");
   check(std::isfinite(options.sun_azimuth_deg), "the sun's azimuth must be a number of degrees");
@@ -293,8 +296,12 @@ void require(const ShadeOptions& options, const GridSize& size) {
             (options.sun_elevation_deg < 90.0 || !casts_shadows(options)),
         "the sun must stand above 0 and below 90 degrees, or at 90 where it casts no shadows");
   check(options.exaggeration > 0.0 && std::isfinite(options.exaggeration), "the exaggeration must be above 0");
-  check(!options.softness || *options.softness > 0.0, "the shadow's softness must be above 0");
-  check(options.elevation_units_per_world_unit > 0.0, "the elevation units in one world unit must be above 0");
+  check(!options.softness || (*options.softness > 0.0 && std::isfinite(*options.softness)),
+        "the shadow's softness must be above 0");
+  check(options.elevation_units_per_world_unit > 0.0 && std::isfinite(options.elevation_units_per_world_unit),
+        "the elevation units in one world unit must be above 0");
+  check(std::ranges::all_of(options.colours, [](const ColourStop& stop) { return std::isfinite(stop.elevation); }),
+        "the colours' elevations must be numbers");
   check(std::is_sorted(options.colours.begin(), options.colours.end(),
                        [](const ColourStop& a, const ColourStop& b) { return a.elevation < b.elevation; }),
         "the colours must be ordered by rising elevation");
@@ -874,6 +881,10 @@ GridSize shade_size(const ArchiveReader& archive, std::optional<std::int64_t> lo
   const WorldBounds& bounds = archive.metadata().valid;
   const double side = std::max(bounds.x1 - bounds.x0, bounds.z1 - bounds.z0);
   const std::int64_t most = longest.value_or(kDefaultPixels);
+  if (most < 1 || most > kMostPixels) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("shade: the longer side is {} pixels, must be 1 to 2^20", most));
+  }
   const double least = longest ? 0.0 : 2.0 * archive.grid().sigma_x();
   const double pixel = std::max(least, side / static_cast<double>(most));
   const auto pixels = [&](double length) {
@@ -884,6 +895,7 @@ GridSize shade_size(const ArchiveReader& archive, std::optional<std::int64_t> lo
 
 ShadeReport shade_rows(const ArchiveReader& archive, const ShadeOptions& options, const TakeShadedRows& take,
                        const Job& job) {
+  require_callback(take);
   ShadeReport report{options.size.value_or(shade_size(archive))};
   require(options, report.size);
   Arena(job).execute([&] {

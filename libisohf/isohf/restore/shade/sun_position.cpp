@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -84,6 +86,12 @@ DaySky::DaySky(const ArchiveReader& archive) {
 }
 
 SunPlace DaySky::sun(const SolarTime& time) const {
+  // Beyond these no calendar goes, and nothing that is computed here holds.
+  if (!std::isfinite(time.hours) || std::abs(time.year) > 9999 || time.month < 1 || time.month > 12 || time.day < 1 ||
+      time.day > 31) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("`date`: there is no {}-{}-{} and {} hours", time.year, time.month, time.day, time.hours));
+  }
   const double days = days_since_2000(time) + (time.hours - place_.longitude / 15.0) / 24.0;
   const Season season = is_mars_ ? on_mars(days) : on_earth(days);
   const double hour_angle = (time.hours - 12.0) * 15.0 + season.equation_of_time;

@@ -8,7 +8,7 @@
 #include <limits>
 #include <numeric>
 
-#include "isohf/base/assert.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
 
@@ -107,10 +107,6 @@ FilledSource::FilledSource(std::unique_ptr<HeightSource> source, const VoidTreat
       filler_(info_, treatment.distance()),
       chunk_rows_(chunk_rows(info_)) {
   if (scratch) file_.emplace(static_cast<std::uint64_t>(info_.width) * (size_bytes(info_.sample_type) + 1), *scratch);
-  if (treatment.distance() < 0 || treatment.distance() > kMaxFillDistance) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: the fill distance is {} samples, must be 0 to {}",
-                                                         info_.path, treatment.distance(), kMaxFillDistance));
-  }
 }
 
 FilledSource::~FilledSource() = default;
@@ -208,7 +204,7 @@ VoidRows FilledSource::rows_at(std::int64_t first, std::int64_t end, std::int64_
 
 void FilledSource::read_window(const Window& window, std::span<std::byte> samples) {
   const std::size_t size = size_bytes(info_.sample_type);
-  ISOHF_ASSERT(samples.size() == static_cast<std::size_t>(window.columns * window.rows) * size);
+  require_window(info_.path, info_.width, info_.height, window, size, samples.size());
   if (samples.empty()) return;
   if (window.columns == info_.width) return read_rows(window.row, window.row + window.rows, samples);
   // Whole rows are filled at once, a few of them at a time: of a --bbox all windows are narrower.
@@ -343,7 +339,15 @@ std::uint64_t FilledSource::buffer_bytes(std::uint64_t limit) const {
 
 std::unique_ptr<HeightSource> with_voids_treated(std::unique_ptr<HeightSource> source, const VoidTreatment& treatment,
                                                  const Job& job) {
+  if (!source) throw Error(ErrorCode::kInvalidArgument, "there is no source whose voids could be treated");
+  const std::string& path = source->info().path;
+  const std::int64_t distance = treatment.fill_distance.value_or(0);
+  if (distance < 0 || distance > kMaxFillDistance) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: the fill distance is {} samples, must be 0 to {}", path, distance, kMaxFillDistance));
+  }
   if (!treatment.does_anything()) return source;
+  require_source(source->info());
   const std::uint64_t in_memory = fill_memory_bytes(treated_info(source->info(), treatment), false);
   const bool in_scratch = job.memory_bytes != 0 && in_memory > job.memory_bytes / 3;
   return std::make_unique<FilledSource>(std::move(source), treatment,

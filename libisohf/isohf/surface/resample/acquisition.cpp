@@ -12,6 +12,7 @@
 #include <optional>
 #include <string_view>
 
+#include "isohf/base/handed_in.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -109,6 +110,39 @@ double response_at(const Kernel& kernel, const Acquisition& acquisition, int k) 
   return 0.0;
 }
 
+void require_sigma(double sigma, const std::string& text) {
+  if (sigma > 0.0 && sigma <= kLargestSigma) return;
+  refuse(fmt::format("acquisition is \"{}\": sigma must be a number above 0 and at most {} source samples", text,
+                     kLargestSigma));
+}
+
+/// Holds taps against what makes a filter, and makes their sum 1; `where` they are from.
+void normalise(std::vector<double>& taps, const std::string& where) {
+  const std::size_t count = taps.size();
+  if (count > kMostTaps) refuse(fmt::format("{}: more than {} taps", where, kMostTaps));
+  if (count % 2 == 0) refuse(fmt::format("{}: {} taps, must be an odd number", where, count));
+  double sum = 0.0;
+  double size = 0.0;
+  for (const double tap : taps) {
+    sum += tap;
+    size += std::abs(tap);
+  }
+  // Decimal fractions of a sum leave 1e-16 or so of each tap.
+  if (std::abs(sum) <= 1e-12 * size || !std::isfinite(size)) {
+    refuse(fmt::format("{}: the taps sum to {}, so that level ground would read as nothing", where, sum));
+  }
+  for (std::size_t i = 0; i < count / 2; ++i) {
+    const double left = taps[i];
+    const double right = taps[count - 1 - i];
+    if (std::abs(left - right) > 1e-9 * size) {
+      refuse(fmt::format("{}: taps {} and {} are {} and {}; the filter must be symmetric", where, i + 1, count - i,
+                         left, right));
+    }
+    taps[i] = taps[count - 1 - i] = 0.5 * (left + right);
+  }
+  for (double& tap : taps) tap /= sum;
+}
+
 double reach_of(const Acquisition& acquisition) {
   switch (acquisition.kind) {
     case Acquisition::Kind::kPoint:
@@ -137,10 +171,7 @@ Acquisition acquisition_from_string(const std::string& text) {
   const std::string_view view = text;
   if (view.starts_with("gaussian:")) {
     const std::optional<double> sigma = number_from(view.substr(9));
-    if (!sigma || !(*sigma > 0.0) || *sigma > kLargestSigma) {
-      refuse(fmt::format("acquisition is \"{}\": sigma must be a number above 0 and at most {} source samples", text,
-                         kLargestSigma));
-    }
+    require_sigma(sigma.value_or(0.0), text);
     result.kind = Acquisition::Kind::kGaussian;
     result.sigma = *sigma;
     return result;
@@ -170,7 +201,14 @@ std::string to_string(const Acquisition& acquisition) {
 }
 
 Acquisition with_taps(const Acquisition& acquisition) {
-  if (acquisition.kind != Acquisition::Kind::kFir || !acquisition.taps.empty()) return acquisition;
+  require_known("`acquisition`", acquisition.kind, Acquisition::Kind::kFir);
+  if (acquisition.kind == Acquisition::Kind::kGaussian) require_sigma(acquisition.sigma, to_string(acquisition));
+  if (acquisition.kind != Acquisition::Kind::kFir) return acquisition;
+  if (!acquisition.taps.empty()) {
+    Acquisition used = acquisition;
+    normalise(used.taps, "`acquisition`");
+    return used;
+  }
   const std::string& path = acquisition.path;
   if (path.empty()) refuse("`acquisition` by taps has neither taps nor a file of them");
   std::ifstream file(path, std::ios::binary);
@@ -204,28 +242,7 @@ Acquisition fir_from_text(const std::string& text, const std::string& path) {
     result.taps.push_back(*tap);
     at = end;
   }
-  const std::size_t count = result.taps.size();
-  if (count % 2 == 0) refuse(fmt::format("{}: {} taps, must be an odd number", path, count));
-  double sum = 0.0;
-  double size = 0.0;
-  for (const double tap : result.taps) {
-    sum += tap;
-    size += std::abs(tap);
-  }
-  // Decimal fractions of a sum leave 1e-16 or so of each tap.
-  if (std::abs(sum) <= 1e-12 * size || !std::isfinite(size)) {
-    refuse(fmt::format("{}: the taps sum to {}, so that level ground would read as nothing", path, sum));
-  }
-  for (std::size_t i = 0; i < count / 2; ++i) {
-    const double left = result.taps[i];
-    const double right = result.taps[count - 1 - i];
-    if (std::abs(left - right) > 1e-9 * size) {
-      refuse(fmt::format("{}: taps {} and {} are {} and {}; the filter must be symmetric", path, i + 1, count - i, left,
-                         right));
-    }
-    result.taps[i] = result.taps[count - 1 - i] = 0.5 * (left + right);
-  }
-  for (double& tap : result.taps) tap /= sum;
+  normalise(result.taps, path);
   return result;
 }
 

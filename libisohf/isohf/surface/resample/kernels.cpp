@@ -4,6 +4,7 @@
 #include <numbers>
 #include <utility>
 
+#include "isohf/base/handed_in.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -187,6 +188,7 @@ Edges edges_from_string(const std::string& text) {
 }
 
 Kernel Kernel::make(Filter filter, Edges edges) {
+  require_known("filter", filter, Filter::kLanczos6);
   int taps = 0;
   for (const FilterEntry& entry : kFilters) {
     if (entry.filter == filter) taps = entry.taps;

@@ -215,6 +215,7 @@ Prefilter::Prefilter(std::vector<double> taps, int border, double worst_gain, Ed
     : taps_(std::move(taps)), border_(taps_.size() == 1 ? 0 : border), edges_(edges), worst_gain_(worst_gain) {}
 
 Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition, Edges edges) {
+  const Acquisition used = with_taps(acquisition);
   // A conversion asks several times for the same, and many conversions do: it takes longer than a small raster.
   static std::mutex mutex;
   static std::map<std::tuple<Filter, Acquisition::Kind, double, Edges>, Prefilter> made;
@@ -226,7 +227,7 @@ Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition, Edges e
     if (const auto found = made.find(key); found != made.end()) return found->second;
   }
   const Kernel kernel = Kernel::make(filter);
-  const std::vector<double> response = sampled_response(kernel, with_taps(acquisition));
+  const std::vector<double> response = sampled_response(kernel, used);
   const std::vector<double> at_points = sampled_response(kernel, Acquisition{});
   std::vector<double> cosines(kCircle);
   for (std::size_t j = 0; j < kCircle; ++j) {

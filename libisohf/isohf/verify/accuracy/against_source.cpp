@@ -481,6 +481,11 @@ class Comparison {
 
 AccuracyReport compare_with_source(const ArchiveReader& archive, HeightSource& source, const Job& job,
                                    std::int64_t random_points) {
+  constexpr std::int64_t kMostPoints = 1'000'000'000;
+  if (random_points < 0 || random_points > kMostPoints) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{} random places are asked for, must be 0 to {}", random_points, kMostPoints));
+  }
   AccuracyReport report;
   Arena(job).execute([&] { report = Comparison(archive, source, random_points).run(job); });
   return report;

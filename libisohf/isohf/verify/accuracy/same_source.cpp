@@ -7,6 +7,7 @@
 #include <cmath>
 #include <string>
 
+#include "isohf/base/handed_in.h"
 #include "isohf/error.h"
 #include "isohf/restore/sample_grids.h"
 #include "isohf/surface.h"
@@ -70,6 +71,7 @@ void compare_systems(const ReferenceSystem& ours, const ReferenceSystem& theirs,
 
 std::vector<Warning> check_same_source(const ArchiveReader& archive, const SourceInfo& other,
                                        std::optional<bool> same_system) {
+  require_source(other);
   const Metadata& metadata = archive.metadata();
   const SourceRecord& record = metadata.source;
   const Georeference ours = source_georeference(record);

@@ -1,4 +1,4 @@
-#include "isohf/base/read_ahead.h"
+#include "isohf/base/memory/read_ahead.h"
 
 #include <algorithm>
 
