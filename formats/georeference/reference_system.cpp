@@ -291,7 +291,14 @@ namespace {
 
 /// What names the datum of a source's longitudes and latitudes: its system, else its ellipsoid, else WGS 84.
 std::string datum_text(const ReferenceSystem& system) {
-  if (std::string text = system_text(system); !text.empty()) return text;
+  if (std::string text = system_text(system); !text.empty()) {
+    // PROJ takes unknown datums of two ellipsoids for one, silently, where their meridians have one name.
+    for (const std::string_view of_bodies : {"PRIMEM[\"Reference_Meridian\"", "PRIMEM[\"Reference meridian\""}) {
+      const std::size_t at = text.find(of_bodies);
+      if (at != std::string::npos) text.replace(at, of_bodies.size(), "PRIMEM[\"Greenwich\"");
+    }
+    return text;
+  }
   if (!system.semi_major_axis_m) return "EPSG:4326";
   const double inverse = system.inverse_flattening.value_or(0.0);
   return inverse > 0.0 ? fmt::format("+proj=longlat +a={} +rf={}", *system.semi_major_axis_m, inverse)
