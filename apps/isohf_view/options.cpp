@@ -1,5 +1,6 @@
 #include "options.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -93,7 +94,11 @@ void add_actions(CommandLine& line, Options& options, bool& window, bool& verify
               "Say what is known of a place, in world units; of two also the heights between them",
               [&](const std::string& text) {
                 options.probe = cli::parse_numbers(text);
-                if (options.probe.size() != 2 && options.probe.size() != 4) refuse(text, "X,Z or X,Z,X,Z");
+                const auto is_place = [](double number) { return std::isfinite(number); };
+                if ((options.probe.size() != 2 && options.probe.size() != 4) ||
+                    !std::all_of(options.probe.begin(), options.probe.end(), is_place)) {
+                  refuse(text, "X,Z or X,Z,X,Z");
+                }
               });
   line.flag("--window", "Open a window even with --screenshot, which then shows the window", window);
   line.exclusive({"--screenshot", "--verify", "--sweep", "--probe"});
@@ -117,6 +122,9 @@ void add_light(CommandLine& line, Options& options, std::optional<double>& time)
   line.option("--sun", "AZIMUTH,ELEVATION", "Degrees, clockwise from North and above the horizon (default 300,35)",
               [&](const std::string& text) {
                 const auto [azimuth, elevation] = parse_tuple<2>(text, "AZIMUTH,ELEVATION, two numbers");
+                if (std::abs(azimuth) > 360.0 || std::abs(elevation) > 90.0) {
+                  refuse(text, "an azimuth from -360 to 360 and an elevation from -90 to 90");
+                }
                 options.sun_azimuth_deg = azimuth;
                 options.sun_elevation_deg = elevation;
               });

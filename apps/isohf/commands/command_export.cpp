@@ -202,6 +202,13 @@ class Exporter {
       const double south = static_cast<double>(row * (grid_.cut.rows - grid_.cut.overlap)) * part.spacing_z;
       part.first_z += part.system ? -south : south;  // northings, and world z
       RasterSpec spec = raster_spec(archive_.metadata(), part, mapping, void_value);
+      if (grid_.cut.asked && !(spec.georeference && spec.georeference->has_origin)) {
+        // Tiles of no known place lie beside each other, from the archive's North-West corner on.
+        if (!spec.georeference) spec.georeference.emplace().registration = Registration::kPoint;
+        spec.georeference->has_origin = true;
+        spec.georeference->origin_x = part.first_x;
+        spec.georeference->origin_y = -part.first_z;
+      }
       spec.overwrite = options_.raster.overwrite;
       spec.scratch = scratch_of(options_.work);
       return spec;
@@ -288,6 +295,13 @@ int run(const ExportOptions& options) {
   arena.execute([&] { exporter.run(); });
   const SampleGrid& samples = grid.samples;
   const SampleMapping& mapping = exporter.mapping;
+  if (exporter.counts.nodata > 0 && raster_kind(options.raster.output) == RasterKind::kRaw16) {
+    print_warning(
+        fmt::format("{}: {} voids are written as {}, which an engine takes for a height; `convert --fill` "
+                    "closes voids",
+                    options.raster.output, describe_count(exporter.counts.nodata),
+                    void_value_of(mapping.type, true).value_or(0.0)));
+  }
   StandardOutput out;
   if (options.common.json) {
     out.write(json_text({{"archive", options.raster.archive},

@@ -52,6 +52,23 @@ TEST(WorldMap, AGlobeIsShownOnceWhereverItsLongitudesBegin) {
   }
 }
 
+// Eastings of 19.5 to 20.6 million metres: the map's cut is at 20.04.
+TEST(WorldMap, ARasterAcrossTheCutOfItsOwnMapIsWholeOnAnother) {
+  const TemporaryFolder folder;
+  const auto sample = [](std::int64_t c, std::int64_t r) {
+    return static_cast<float>(100.0 + 2.0 * double(c) + double(r));
+  };
+  write_gridfloat(folder / "a", 110, 50, 19500000.0, 1000000.0, 10000.0, sample, "");
+  std::filesystem::remove(folder / "a.prj");
+  const RunResult made = run_isohf({"convert", folder / "a.flt", folder / "a.isohf", "--crs", "EPSG:4087",
+                                    "--projection", "transverse-mercator", "--type", "f32"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const RunResult verified =
+      run_isohf({"verify", folder / "a.isohf", "--crs", "EPSG:4087", "--against", folder / "a.flt", "--json"});
+  EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
+  EXPECT_NE(verified.out.find("\"samples_compared\": 5500"), std::string::npos) << verified.out;
+}
+
 TEST(WorldMap, ItsOwnDegreesGiveAllColumnsAndTheBoxThatIsAsked) {
   const TemporaryFolder folder;
   for (const double west : {0.0, 90.0, -180.0}) {

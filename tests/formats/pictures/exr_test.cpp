@@ -368,7 +368,7 @@ TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
   EXPECT_THAT(error_of([&] { (void)open_exr(path, wrong); }).what(), HasSubstr("in parts 0...2"));
   write_file(folder / "a.asc", "ncols 1\nnrows 1\n1\n");
   EXPECT_THAT(error_of([&] { (void)open_raster(folder / "a.asc", wrong); }).what(),
-              HasSubstr("`part` is for archives and OpenEXR"));
+              HasSubstr("`part` is for archives, TIFF and OpenEXR"));
 }
 
 TEST(ExrSource, RefusesSubsampledChannelsOnly) {

@@ -59,15 +59,16 @@ bool is_asked_for(const QuantisationRequest& request) {
 }
 
 [[noreturn]] void refuse_step(const QuantisationRequest& request, double steps, const ElevationRange& range,
-                              double codes) {
-  const double finest = finest_step(range, codes) * 1.0001;
+                              double codes, bool divides_range) {
+  const double finest = divides_range ? (range.max - range.min) / codes : finest_step(range, codes) * 1.0001;
   const bool by_rounding = request.max_rounding.has_value();
+  const double wanted = by_rounding ? finest / 2.0 + request.height_error : finest;
   throw Error(ErrorCode::kInvalidArgument,
-              fmt::format("{} {} needs {:.0f} codes for elevations {} to {}, {} has {:.0f}; use {:.6g} or more, or "
+              fmt::format("{} {} needs {:.0f} codes for elevations {} to {}, {} has {:.0f}; use {:.{}g}{}, or "
                           "`code_type` f32",
                           by_rounding ? "`max_rounding`" : "step", by_rounding ? *request.max_rounding : *request.step,
-                          steps + 1.0, range.min, range.max, to_string(request.type), codes + 1.0,
-                          by_rounding ? finest / 2.0 + request.height_error : finest));
+                          steps + 1.0, range.min, range.max, to_string(request.type), codes + 1.0, wanted,
+                          divides_range ? 12 : 6, divides_range ? "" : " or more"));
 }
 
 }  // namespace
@@ -85,9 +86,15 @@ Quantisation choose_quantisation(const QuantisationRequest& request, const Eleva
   if (const std::optional<double> step = wanted_step(request, info)) {
     quantisation.scale = *step;
     if (is_asked_for(request)) {
-      if (codes_needed(range, *step) > codes) refuse_step(request, codes_needed(range, *step), range, codes);
+      if (codes_needed(range, *step) > codes) refuse_step(request, codes_needed(range, *step), range, codes, false);
     } else {
       while (codes_needed(range, quantisation.scale) > codes) quantisation.scale *= 2.0;
+      // A bound on the error that doubled steps would use up by themselves is met by the finest.
+      if (request.wish && quantisation.scale >= 4.0 * *request.wish && finest_step(range, codes) < quantisation.scale) {
+        quantisation.scale = finest_step(range, codes);
+        quantisation.offset = range.min;
+        return quantisation;
+      }
     }
     quantisation.offset = std::floor(range.min / quantisation.scale) * quantisation.scale;
     return quantisation;
@@ -113,7 +120,7 @@ Quantisation quantisation_of_range(const QuantisationRequest& request, const Ele
   if (std::optional<double> step = wanted_step(request, info)) {
     steps = steps_of(*step);
     if (is_asked_for(request)) {
-      if (steps > codes) refuse_step(request, steps, range, codes);
+      if (steps > codes) refuse_step(request, steps, range, codes, !request.max_rounding);
       if (request.step && std::abs(span / *step - steps) > 1e-9 * steps) {
         throw Error(ErrorCode::kInvalidArgument,
                     fmt::format("`step` {} does not divide `z_range` {}:{}, whose ends are both codes: {:.6g} steps; "

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "isohf/base/assert.h"
 #include "isohf/base/simd.h"
@@ -101,15 +102,29 @@ ExactWarp::ExactWarp(const WarpPlace& place)
     : place_(place),
       projection_(place.projection),
       middle_longitude_(place.first_sample.easting + place.step_x * static_cast<double>(place.width - 1) / 2.0),
-      middle_u_(static_cast<double>(place.width - 1) / 2.0) {}
+      middle_u_(static_cast<double>(place.width - 1) / 2.0) {
+  if (!place.source_map) {
+    turn_ = 360.0;
+    return;
+  }
+  // Samples on the other side of the map's cut come back from degrees a turn away.
+  const double middle_row = place.first_sample.northing - place.step_z * static_cast<double>(place.height - 1) / 2.0;
+  const std::optional<double> turn = turn_of(*place.source_map, {middle_longitude_, middle_row});
+  for (const double side : {-1.0, 1.0}) {
+    const MapPoint end{middle_longitude_ + side * middle_u_ * place.step_x, middle_row};
+    const MapPoint back = place.source_map->map_from_geo(place.source_map->geo_from_map(end));
+    if (turn && std::abs(back.easting - end.easting) > 0.5 * *turn) turn_ = *turn;
+  }
+}
 
 SourcePosition ExactWarp::source_from_geo(GeoPoint geo) const {
   if (place_.source_map) {
-    const MapPoint at = place_.source_map->map_from_geo(geo);
+    MapPoint at = place_.source_map->map_from_geo(geo);
+    if (turn_ > 0.0) at.easting -= turn_ * std::nearbyint((at.easting - middle_longitude_) / turn_);
     return {(at.easting - place_.first_sample.easting) / place_.step_x,
             (place_.first_sample.northing - at.northing) / place_.step_z};
   }
-  const double turn = std::remainder(geo.longitude - middle_longitude_, 360.0);
+  const double turn = std::remainder(geo.longitude - middle_longitude_, turn_);
   return {middle_u_ + turn / place_.step_x, (place_.first_sample.northing - geo.latitude) / place_.step_z};
 }
 

@@ -54,8 +54,9 @@ class ExactWarp {
  private:
   WarpPlace place_;
   Projection projection_;
-  double middle_longitude_;
+  double middle_longitude_;  ///< or easting
   double middle_u_;
+  double turn_ = 0.0;  ///< once round the body, where the source's coordinates may lie on the other side of it; else 0
 };
 
 /// Where the vertices of tiles lie in the source: the inverse projection, approximated to kTolerance.
