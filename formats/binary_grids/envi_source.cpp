@@ -111,26 +111,47 @@ class EnviSource final : public DescribedSource {
       read_named_system(parts);
     }
     const auto system = words.find("coordinate system string");
-    if (system == words.end()) return;
-    std::string wkt = system->second;
+    std::string wkt = system == words.end() ? std::string() : system->second;
     if (wkt.starts_with("{")) wkt = trimmed(wkt.substr(1, wkt.size() - (wkt.ends_with("}") ? 2 : 1)));
-    if (wkt.empty()) return;
+    if (wkt.empty()) {
+      if (map != words.end()) tell_lost_system(list_of(map->second).front());
+      return;
+    }
     place.metres_per_unit = 1.0;  // the text's own unit counts
     read_system_text(wkt, header_, info_);
+  }
+
+  void tell_lost_system(const std::string& projection) {
+    const std::string word = lower_case(projection);
+    if (word.starts_with("arbitrary") || info_.georeference.system.epsg || !info_.georeference.system.wkt.empty())
+      return;
+    info_.warnings.push_back(
+        loss(fmt::format("{}: map info names \"{}\" and a datum that isohf does not take from there, and there "
+                         "is no coordinate system string: the reference system is left out; give `crs`",
+                         header_, one_line(projection))));
   }
 
   void read_named_system(const std::vector<std::string>& parts) {
     Georeference& place = info_.georeference;
     const auto names_wgs84 = [](const std::string& part) { return part == "WGS-84" || part == "WGS84"; };
     const bool is_wgs84 = std::ranges::any_of(parts, names_wgs84);
+    // Of the other datums the two that most maps of North America are on: their codes in degrees, and of zone 0 of UTM.
+    const auto names = [&parts](const char* datum) {
+      return std::ranges::any_of(parts, [&](const std::string& part) { return lower_case(part) == datum; });
+    };
+    const int degrees = names("north america 1927") ? 4267 : names("north america 1983") ? 4269 : 0;
     if (lower_case(parts[0]).starts_with("geographic")) {
       place.unit = HorizontalUnit::kDegree;
       if (is_wgs84) place.system = wgs84_system();
+      if (degrees != 0) read_system_text(fmt::format("EPSG:{}", degrees), header_, info_);
     } else if (lower_case(parts[0]) == "utm" && parts.size() > 8) {
       place.unit = HorizontalUnit::kMetre;
       const double zone = number(parts[7], "map info");
       if (is_wgs84 && zone >= 1.0 && zone <= 60.0) {
         place.system = wgs84_utm_zone(static_cast<int>(zone), lower_case(parts[8]) == "south");
+      } else if (degrees != 0 && zone >= 1.0 && zone <= 22.0 && lower_case(parts[8]) == "north") {
+        read_system_text(fmt::format("EPSG:{}", (degrees == 4267 ? 26700 : 26900) + static_cast<int>(zone)), header_,
+                         info_);
       }
     }
     read_unit(parts);

@@ -65,6 +65,22 @@ TEST_F(Envi, FeetOfMapInfoAreUsSurveyFeet) {
   EXPECT_THAT(failure("a.dat"), HasSubstr("its coordinates are in seconds"));
 }
 
+TEST_F(Envi, SystemsThatMapInfoNamesAreTakenOrTold) {
+  write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
+#if defined(ISOHF_WITH_PROJ)
+  set_module_folder(ISOHF_BIN_DIR);
+  write("a.hdr", envi("map info = {UTM, 1, 1, 500000, 4900000, 30, 30, 12, North, North America 1927}\n"));
+  EXPECT_EQ(open("a.dat")->info().georeference.system.epsg, 26712);
+  write("a.hdr",
+        envi("map info = {Geographic Lat/Lon, 1, 1, -110, 40, 0.1, 0.1, North America 1983, units=Degrees}\n"));
+  EXPECT_EQ(open("a.dat")->info().georeference.system.epsg, 4269);
+#endif
+  write("a.hdr", envi("map info = {State Plane (NAD 83), 1, 1, 600000, 400000, 10, 10, 3104, units=Feet}\n"));
+  EXPECT_THAT(open("a.dat")->info().warnings, testing::Contains(HasSubstr("the reference system is left out")));
+  write("a.hdr", envi("map info = {Arbitrary, 1, 1, 0, 0, 1, 1}\n"));
+  EXPECT_THAT(open("a.dat")->info().warnings, testing::Not(testing::Contains(HasSubstr("left out"))));
+}
+
 TEST_F(Envi, RowsFromTheSouthAreTurned) {
   write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
   for (const char* way : {"10, -20, 32, North, WGS-84", "10, 20, 32, North, WGS-84, rotation=180"}) {
