@@ -281,5 +281,13 @@ TEST_F(ExportCommand, KeepsWhatTookAnOldFilesPlaceWhereALaterTileFails) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "t_x1_y0.npy"));
 }
 
+TEST(ExportVoids, AreToldWhereAFileOfNumbersAloneHoldsThem) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_isohf({"convert", kVoids, folder / "a.isohf", "-q"}).exit_code, 0);
+  const RunResult written = run_isohf({"export", folder / "a.isohf", folder / "a.r16"});
+  EXPECT_EQ(written.exit_code, 0) << written.err;
+  EXPECT_NE(written.err.find("voids are written as 65535"), std::string::npos) << written.err;
+}
+
 }  // namespace
 }  // namespace isohf::test

@@ -83,6 +83,21 @@ TEST_F(MaxError, RunsThroughEverySampleWhereNothingLessHolds) {
   EXPECT_EQ(found.at("samples_compared"), 150 * 130 - 19);
 }
 
+// 65536 values and 65535 codes: doubled, the usual step rounds by 1.
+TEST_F(MaxError, IntegersThatTakeAllCodesGetTheFinestStep) {
+  std::ofstream raw(folder / "full.r16", std::ios::binary);
+  for (int i = 0; i < 257 * 257; ++i) {
+    const double x = i % 257 / 256.0;
+    const double y = i / 257 / 256.0;
+    const auto sample = static_cast<std::uint16_t>(std::lround(65535.0 * (0.5 * x + 0.5 * y)));
+    raw.write(reinterpret_cast<const char*>(&sample), sizeof sample);
+  }
+  raw.close();
+  const RunResult made = run_isohf(
+      {"convert", folder / "full.r16", folder / "a.isohf", "--raw", "257x257:u16le", "--max-error", "0.9", "-q"});
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+}
+
 TEST_F(MaxError, WhatTheUserGaveStaysAndIsNamedWhereItIsInTheWay) {
   const RunResult result = convert({"--max-error", "3", "--density", "0.25"});
   EXPECT_EQ(result.exit_code, 2);
