@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -490,27 +491,33 @@ void move(const IsohfProjSystem& system, PJ_DIRECTION direction, double* places,
 
 /// Sets most_apart where corners of the box around the whole body's image are none of its places.
 void find_outline(IsohfProjSystem& system) {
+  constexpr int kAcross = 37;
+  constexpr int kDown = 7;
+  double at[2 * kAcross * kDown];
+  for (int i = 0; i < kAcross * kDown; ++i) {
+    at[2 * i] = -179.9 + (i % kAcross) * (359.8 / (kAcross - 1));
+    at[2 * i + 1] = -85.0 + (i / kAcross) * (170.0 / (kDown - 1));
+  }
+  move(system, PJ_INV, at, kAcross * kDown);
   double box[4] = {HUGE_VAL, HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-  for (int i = 0; i < 37 * 7; ++i) {
-    double at[2] = {-179.9 + (i % 37) * (359.8 / 36), -85.0 + (i / 37) * (170.0 / 6)};
-    move(system, PJ_INV, at, 1);
-    for (int axis = 0; axis < 2 && std::isfinite(at[0]) && std::isfinite(at[1]); ++axis) {
-      box[axis] = std::min(box[axis], at[axis]);
-      box[axis + 2] = std::max(box[axis + 2], at[axis]);
-    }
+  for (int i = 0; i < 2 * kAcross * kDown; ++i) {
+    if (!std::isfinite(at[i])) continue;  // of both coordinates, or neither
+    box[i % 2] = std::min(box[i % 2], at[i]);
+    box[i % 2 + 2] = std::max(box[i % 2 + 2], at[i]);
   }
   const double size = std::max(box[2] - box[0], box[3] - box[1]);
   if (!(size > 0.0) || !std::isfinite(size)) return;
   constexpr double kMostApart = 1e-4;
-  for (int corner = 0; corner < 4; ++corner) {
-    const double from[2] = {box[corner % 2 * 2], box[corner / 2 * 2 + 1]};
-    double at[2] = {from[0], from[1]};
-    move(system, PJ_FWD, at, 1);
-    if (!std::isfinite(at[0])) continue;
-    move(system, PJ_INV, at, 1);
-    if (std::hypot(at[0] - from[0], at[1] - from[1]) <= kMostApart * size) continue;
-    system.most_apart = kMostApart * size;
-    return;
+  const double corners[8] = {box[0], box[1], box[2], box[1], box[0], box[3], box[2], box[3]};
+  double back[8];
+  std::copy(std::begin(corners), std::end(corners), back);
+  move(system, PJ_FWD, back, 4);
+  bool is_place[4];
+  for (int i = 0; i < 4; ++i) is_place[i] = std::isfinite(back[2 * i]);
+  move(system, PJ_INV, back, 4);
+  for (int i = 0; i < 4; ++i) {
+    const double apart = std::hypot(back[2 * i] - corners[2 * i], back[2 * i + 1] - corners[2 * i + 1]);
+    if (is_place[i] && !(apart <= kMostApart * size)) system.most_apart = kMostApart * size;
   }
 }
 

@@ -34,8 +34,8 @@ void add_size_options(CommandLine& line, const std::string& size_description, Ra
 /// The spacing asked for in the archive's world units. Throws Error{kInvalidArgument} for metres where these are
 /// unknown.
 [[nodiscard]] std::optional<double> spacing_in_world(const RasterOptions& options, const Metadata& metadata);
-/// The grid in --crs over a part of the world, which --bbox gives where it is there; warnings are printed. Throws Error{kInvalidArgument} for a system that
-/// is not understood, --method hex, and a spacing in metres where coordinates are degrees.
+/// The grid in --crs over a part of the world, which --bbox gives where it is there; warnings are printed.
+/// Throws Error{kInvalidArgument} for a system that is not understood, --method hex, and a spacing in metres where coordinates are degrees.
 [[nodiscard]] SampleGrid asked_grid_in_system(const RasterOptions& options, ArchiveReader& archive,
                                               const WorldBounds& ground, const std::optional<MapBounds>& box,
                                               bool quiet);

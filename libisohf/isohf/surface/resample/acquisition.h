@@ -7,8 +7,8 @@
 
 namespace isohf {
 
-/// The acquisition as it is used, held against its rules: with its taps, from its file where it has none: text, numbers apart by white space, '#' starts a
-/// comment that goes on to the line's end; an odd count of at most 255, symmetric (the reconstruction could not be
+/// The acquisition as it is used, held against its rules: with its taps, from its file where it has none: text, numbers
+/// apart by white space, '#' starts a comment that goes on to the line's end; an odd count of at most 255, symmetric (the reconstruction could not be
 /// mirrored at the raster's edges otherwise), with a sum other than 0, by which they are divided.
 /// Throws Error{kInvalidArgument} for any other contents, Error{kIo} where the file cannot be read.
 [[nodiscard]] Acquisition with_taps(const Acquisition& acquisition);

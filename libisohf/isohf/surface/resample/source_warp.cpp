@@ -110,10 +110,11 @@ ExactWarp::ExactWarp(const WarpPlace& place)
   // Samples on the other side of the map's cut come back from degrees a turn away.
   const double middle_row = place.first_sample.northing - place.step_z * static_cast<double>(place.height - 1) / 2.0;
   const std::optional<double> turn = turn_of(*place.source_map, {middle_longitude_, middle_row});
+  if (!turn) return;
   for (const double side : {-1.0, 1.0}) {
     const MapPoint end{middle_longitude_ + side * middle_u_ * place.step_x, middle_row};
     const MapPoint back = place.source_map->map_from_geo(place.source_map->geo_from_map(end));
-    if (turn && std::abs(back.easting - end.easting) > 0.5 * *turn) turn_ = *turn;
+    if (std::abs(back.easting - end.easting) > 0.5 * *turn) turn_ = *turn;
   }
 }
 

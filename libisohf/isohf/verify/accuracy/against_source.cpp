@@ -243,11 +243,12 @@ class Comparison {
 
   [[nodiscard]] double elevation_at(const TileRowSurface& surface, WorldPoint world) const {
     // A projected source lies on the tiles as a whole: what does not is none of theirs.
-    const double far_x = std::abs(world.x / grid_.extent_x() - 0.5 * static_cast<double>(grid_.tile_columns()));
-    const double far_z = std::abs(world.z / grid_.extent_z() - 0.5 * static_cast<double>(grid_.tile_rows()));
     constexpr double kOnTheEdge = 0.01;  // of a tile
-    if (!(far_x <= 0.5 * static_cast<double>(grid_.tile_columns()) + kOnTheEdge &&
-          far_z <= 0.5 * static_cast<double>(grid_.tile_rows()) + kOnTheEdge)) {
+    const auto is_beside = [](double at, double end, double extent) {
+      return !(std::abs(std::clamp(at, 0.0, end) - at) <= kOnTheEdge * extent);
+    };
+    if (is_beside(world.x, grid_.world_width(), grid_.extent_x()) ||
+        is_beside(world.z, grid_.world_height(), grid_.extent_z())) {
       return NAN;
     }
     const TilePoint at = locate(surface.tile_row, world);

@@ -15,12 +15,9 @@ namespace {
 
 constexpr std::ptrdiff_t kLanes = SlantedRows::kLanes;
 
-ISOHF_KERNEL void find_magnitudes(const std::uint16_t* zigzagged, int begin, int end, int shift,
+ISOHF_KERNEL void find_magnitudes(const std::uint16_t* zigzagged, int begin, int end, unsigned shift,
                                   std::uint8_t* __restrict magnitudes) {
-  for (int i = begin; i < end; ++i) {
-    const auto shifted = static_cast<std::uint16_t>(zigzagged[i] >> shift);
-    magnitudes[i] = static_cast<std::uint8_t>(shifted < kMagnitudeLimit ? shifted : kMagnitudeLimit);
-  }
+  for (int i = begin; i < end; ++i) magnitudes[i] = magnitude(zigzagged[i], shift);
 }
 
 /// The residuals of a tile, row by row: what a row's are follows from those of the rows above, not from samples.
@@ -52,7 +49,7 @@ class Residuals {
       zigzagged[place * kLanes] = residual;
     }
     std::uint8_t* const magnitudes = magnitudes_.current();
-    vectorised<find_magnitudes>(row_.data(), first, last + 1, static_cast<int>(payload_.header.energy_shift),
+    vectorised<find_magnitudes>(row_.data(), first, last + 1, static_cast<unsigned>(payload_.header.energy_shift),
                                 magnitudes);
     for (int side = 0; r % 2 == 0 && side < 2; ++side) {
       if (is_void != nullptr && is_void[column_of_slid(columns_, side)] != 0) continue;
@@ -153,28 +150,26 @@ bool decode_single(const TileShape& shape, const BatchPayload<std::uint16_t>& pa
   Residuals residuals(columns, payload);
   SlantedRows slanted(columns);
   slanted.fill_above(columns, header.base);
-  BandCodes band_codes(columns);
+  BandCodes band_codes(columns, tile.type);
   std::vector<std::uint16_t> zigzagged(static_cast<std::size_t>((columns + delay(kBandRows)) * kLanes));
   std::array<std::array<std::uint16_t, 2>, kBandRows> slid{};
-  const auto void_code = static_cast<std::uint16_t>(Quantisation{tile.type, 0.0, 1.0}.void_code());
   for (int top = 0; top < shape.rows(); top += kBandRows) {
     const int rows = std::min(kBandRows, shape.rows() - top);
     const auto offset = static_cast<std::ptrdiff_t>(top) * columns;
-    const std::uint8_t* const voids = payload.is_void.empty() ? nullptr : payload.is_void.data() + offset;
-    const bool has_voids = voids != nullptr && std::find(voids, voids + rows * columns, 1) != voids + rows * columns;
+    const std::uint8_t* const voids = voids_of_band(payload.is_void, top, rows, columns);
     for (int lane = 0; lane < rows; ++lane) {
-      if (!residuals.take_row(top + lane, has_voids ? voids + lane * columns : nullptr,
+      if (!residuals.take_row(top + lane, voids != nullptr ? voids + lane * columns : nullptr,
                               zigzagged.data() + delay(lane) * kLanes + lane, slid[static_cast<std::size_t>(lane)])) {
         return false;
       }
     }
     if (top <= kBandRows) constants.weights = slanted_weights(header.predictors, top);
-    const Band band{{slanted, columns, rows, has_voids ? voids : nullptr}, constants, zigzagged.data()};
+    const Band band{{slanted, columns, rows, voids}, constants, zigzagged.data()};
     if (!vectorised<restore_band<false>, restore_band<true>>(band)) return false;
     band_codes.store(band, tile.codes.data() + offset);
     for (int lane = 0; lane < rows; ++lane) {
       std::uint16_t* const codes = tile.codes.data() + offset + lane * columns;
-      const std::uint8_t* const is_void = has_voids ? voids + lane * columns : nullptr;
+      const std::uint8_t* const is_void = voids != nullptr ? voids + lane * columns : nullptr;
       for (int side = 0; lane % 2 == 0 && side < 2; ++side) {
         const int column = column_of_slid(columns, side);
         if (is_void != nullptr && is_void[column] != 0) continue;
@@ -187,7 +182,6 @@ bool decode_single(const TileShape& shape, const BatchPayload<std::uint16_t>& pa
           return false;
         codes[column] = static_cast<std::uint16_t>(sample);
       }
-      for (int c = 0; is_void != nullptr && c < columns; ++c) codes[c] = is_void[c] != 0 ? void_code : codes[c];
     }
     slanted.next_band(columns);
   }

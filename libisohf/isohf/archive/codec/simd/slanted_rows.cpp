@@ -14,6 +14,13 @@ ISOHF_KERNEL void turn_band(SlantedRows& slanted, const std::array<std::uint16_t
 
 }  // namespace
 
+const std::uint8_t* voids_of_band(const std::vector<std::uint8_t>& is_void, int top, int rows, int columns) {
+  if (is_void.empty()) return nullptr;
+  const std::uint8_t* const first = is_void.data() + static_cast<std::ptrdiff_t>(top) * columns;
+  const std::uint8_t* const end = first + static_cast<std::ptrdiff_t>(rows) * columns;
+  return std::find(first, end, 1) == end ? nullptr : first;
+}
+
 void BandCodes::store(const SlantedBand& band, std::uint16_t* codes) {
   std::array<std::uint16_t*, 8> rows{};
   for (int lane = 0; lane < SlantedRows::kLanes; ++lane) {
@@ -24,9 +31,13 @@ void BandCodes::store(const SlantedBand& band, std::uint16_t* codes) {
     const std::uint16_t* const from = codes_.data() + lane * stride_ + kSpare;
     std::uint16_t* const row =
         std::copy_n(from, columns_, codes + static_cast<std::ptrdiff_t>(lane) * columns_) - columns_;
-    if (lane % 2 != 0) continue;
-    row[0] = from[first_of(lane)];
-    row[columns_ - 1] = from[last_of(lane, columns_)];
+    if (lane % 2 == 0) {
+      row[0] = from[first_of(lane)];
+      row[columns_ - 1] = from[last_of(lane, columns_)];
+    }
+    if (band.is_void == nullptr) continue;
+    const std::uint8_t* const is_void = band.is_void + static_cast<std::ptrdiff_t>(lane) * columns_;
+    for (int c = 0; c < columns_; ++c) row[c] = is_void[c] != 0 ? void_ : row[c];
   }
 }
 

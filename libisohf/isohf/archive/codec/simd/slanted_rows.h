@@ -13,6 +13,7 @@
 #include "isohf/archive/codec/predict/sample_lattice.h"
 #include "isohf/archive/codec/simd/sample_pairs.h"
 #include "isohf/archive/codec/simd/vector_operations.h"
+#include "isohf/archive/codec/tile_codes.h"
 
 /// Eight rows of one tile in the lanes of a register, each three and a half places behind the one above, so that what a
 /// sample is predicted from is known when its time comes. Samples of version 1 and 2 of payloads are restored so.
@@ -250,12 +251,18 @@ ISOHF_KERNEL bool walk_band(const SlantedBand& band, Recent& recent, const Step&
   return true;
 }
 
-/// The codes of a band that is done, row by row: all but those of slid vertices, which get anything.
+/// The voids of `rows` rows from `top` on; nullptr where none of them is.
+[[nodiscard]] const std::uint8_t* voids_of_band(const std::vector<std::uint8_t>& is_void, int top, int rows,
+                                                int columns);
+
+/// The codes of a band that is done, row by row, voids among them: all but those of slid vertices, which get anything
+/// where they are none.
 class BandCodes {
  public:
-  explicit BandCodes(int columns)
+  BandCodes(int columns, CodeType type)
       : columns_(columns),
         stride_(columns + 2 * kSpare),
+        void_(static_cast<std::uint16_t>(Quantisation{type, 0.0, 1.0}.void_code())),
         codes_(static_cast<std::size_t>(stride_ * SlantedRows::kLanes)) {}
 
   void store(const SlantedBand& band, std::uint16_t* codes);
@@ -265,6 +272,7 @@ class BandCodes {
 
   int columns_;
   int stride_;
+  std::uint16_t void_;
   std::vector<std::uint16_t> codes_;
 };
 

@@ -321,7 +321,7 @@ class WavefrontDecoder {
         columns_(shape.columns()),
         rows_(shape.rows()),
         slanted_(columns_),
-        band_codes_(columns_),
+        band_codes_(columns_, payload.type),
         words_(payload.words.size() + kSlack),
         extra_(payload.extra.size() + kSlack) {
     std::copy(payload.words.begin(), payload.words.end(), words_.begin());
@@ -345,11 +345,7 @@ class WavefrontDecoder {
     for (int top = 0; top < rows_; top += kBandRows) {
       const int rows = std::min(kBandRows, rows_ - top);
       if (top <= kBandRows) constants_.weights = slanted_weights(payload_.predictors, top);
-      const std::uint8_t* is_void = nullptr;
-      if (!payload_.is_void.empty()) {
-        is_void = payload_.is_void.data() + static_cast<std::ptrdiff_t>(top) * columns_;
-        if (std::find(is_void, is_void + rows * columns_, 1) == is_void + rows * columns_) is_void = nullptr;
-      }
+      const std::uint8_t* const is_void = voids_of_band(payload_.is_void, top, rows, columns_);
       if (!decode({{slanted_, columns_, rows, is_void}, source_, model_, constants_}, top)) {
         return false;
       }
@@ -370,10 +366,6 @@ class WavefrontDecoder {
       for (int side = 0; lane % 2 == 0 && side < 2; ++side) {
         if (!decode_slid(band, lane, side, codes)) return false;
       }
-      if (band.is_void == nullptr) continue;
-      const std::uint8_t* const is_void = band.is_void + static_cast<std::ptrdiff_t>(lane) * columns_;
-      const auto void_code = static_cast<std::uint16_t>(Quantisation{payload_.type, 0.0, 1.0}.void_code());
-      for (int c = 0; c < columns_; ++c) codes[c] = is_void[c] != 0 ? void_code : codes[c];
     }
     return source_.is_good();
   }
