@@ -498,6 +498,22 @@ MapBounds turned_onto(const SampleGrid& grid, double half, MapBounds bounds) {
   return bounds;
 }
 
+/// The samples of a source, whose rows `all` counts southwards, that lie between bounds of its coordinates with `half` a
+/// spacing around each; nullopt where there are none.
+std::optional<SampleGrid> source_samples_in(const MapBounds& bounds, const SampleGrid& all, double half,
+                                            Registration registration) {
+  const WorldBounds within{
+      std::max(bounds.west, all.first_x - half * all.spacing_x),
+      std::max(-bounds.north, all.first_z - half * all.spacing_z),
+      std::min(bounds.east, all.first_x + (static_cast<double>(all.width - 1) + half) * all.spacing_x),
+      std::min(-bounds.south, all.first_z + (static_cast<double>(all.height - 1) + half) * all.spacing_z)};
+  auto part = part_of(all, within);
+  if (!part) return std::nullopt;
+  part->first_z = -part->first_z;
+  part->registration = registration;
+  return part;
+}
+
 }  // namespace
 
 std::optional<SampleGrid> own_grid_in_box(const Metadata& metadata, const GridSystem& system, const MapBounds& box) {
@@ -514,14 +530,7 @@ std::optional<SampleGrid> own_grid_in_box(const Metadata& metadata, const GridSy
     // Columns go on behind the last one where they go round.
     if (static_cast<double>(all.width) * all.spacing_x >= kTurn - 0.5 * all.spacing_x) all.width *= 2;
   }
-  const WorldBounds within{std::max(here.west, all.first_x), std::max(-here.north, all.first_z),
-                           std::min(here.east, all.first_x + static_cast<double>(all.width - 1) * all.spacing_x),
-                           std::min(-here.south, all.first_z + static_cast<double>(all.height - 1) * all.spacing_z)};
-  auto part = part_of(all, within);
-  if (!part) return std::nullopt;
-  part->first_z = -part->first_z;
-  part->registration = place.registration;
-  return part;
+  return source_samples_in(here, all, 0.0, place.registration);
 }
 
 SampleGrid grid_in_system(const Metadata& metadata, const WorldBounds& ground, std::shared_ptr<const GridSystem> system,
@@ -543,20 +552,13 @@ SampleGrid grid_in_system(const Metadata& metadata, const WorldBounds& ground, s
   if (place.has_origin && !size && !spacing) {
     // The samples of the source that lie on the ground.
     const SourceRecord& source = metadata.source;
-    grid = {source.width, source.height, place.origin_x, -place.origin_y, place.spacing_x, place.spacing_y};
+    const SampleGrid all{source.width,    source.height,   place.origin_x,
+                         -place.origin_y, place.spacing_x, place.spacing_y};
     const double half = place.registration == Registration::kArea ? 0.5 : 0.0;
-    const SampleGrid all = grid;
     if (place.unit == HorizontalUnit::kDegree) bounds = turned_onto(all, half, bounds);
-    const WorldBounds within{
-        std::max(bounds.west, all.first_x - half * all.spacing_x),
-        std::max(-bounds.north, all.first_z - half * all.spacing_z),
-        std::min(bounds.east, all.first_x + (static_cast<double>(all.width - 1) + half) * all.spacing_x),
-        std::min(-bounds.south, all.first_z + (static_cast<double>(all.height - 1) + half) * all.spacing_z)};
-    const auto part = part_of(all, within);
+    const auto part = source_samples_in(bounds, all, half, place.registration);
     if (!part) refuse("no sample of the archive's source lies there; give `size` or `spacing`");
     grid = *part;
-    grid.first_z = -grid.first_z;
-    grid.registration = place.registration;
     grid.system = std::move(system);
     return grid;
   }
