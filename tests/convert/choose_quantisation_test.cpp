@@ -29,6 +29,15 @@ TEST(Quantiser, IntegerSourcesGetHalfAStepAndKeepWholeElevationsWhole) {
   EXPECT_GE(elevation_from_code(wide, wide.max_code()), 21134.0);
 }
 
+TEST(Quantiser, WholeElevationsThatTakeMoreCodesThanThereAreGetTheFinestStep) {
+  const ElevationRange all{0.0, 65535.0};
+  const Quantisation q = choose_quantisation({CodeType::kU16, {}}, all, info_of(SampleType::kUint16));
+  EXPECT_NEAR(q.scale, 65535.0 / 65534.0, 1e-8) << "2 would lose every second elevation";
+  EXPECT_GE(elevation_from_code(q, q.max_code()), 65535.0);
+  EXPECT_NEAR(quantisation_of_range({CodeType::kU16, {}}, all, info_of(SampleType::kUint16)).scale, 65535.0 / 65534.0,
+              1e-8);
+}
+
 TEST(Quantiser, FloatSourcesGetTheFinestStepThatSpansTheRange) {
   const Quantisation q = choose_quantisation({CodeType::kU16, {}}, {-4472.67, -4437.88}, info_of(SampleType::kFloat32));
   EXPECT_NEAR(q.scale, 34.79 / 65534.0, 1e-9);

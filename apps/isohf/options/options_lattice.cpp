@@ -104,9 +104,9 @@ void add_quantisation_options(CommandLine& line, ConvertOptions& options) {
                 }
               });
   line.option("--max-rounding", "E",
-              "Store every vertex's elevation to within E: steps of twice that (as MAX_Z_ERROR of LERC)",
+              "Store every vertex's elevation to within E (as MAX_Z_ERROR of LERC): by steps of twice that, or with a "
+              "finer --step by those codes within reach that vary least",
               [&](const std::string& text) { options.max_rounding = parse_positive_number(text); });
-  line.exclusive({"--step", "--max-rounding"});
   line.option("--max-error", "E",
               "Hold the surface, as drawn, to within E of every input sample: chooses density, step and filter where "
               "they are not given, measures all, and refuses what cannot be held",

@@ -82,7 +82,8 @@ struct ConvertOptions {
   std::optional<std::pair<double, double>> z_range;
   /// Elevation step of one code; nullopt: chosen (docs/decisions/0011). 0 asks for the finest that the code type holds.
   std::optional<double> step;
-  /// Instead of a step: every vertex is stored to within that (LERC's MAX_Z_ERROR), or convert() refuses.
+  /// Every vertex is stored to within that (LERC's MAX_Z_ERROR), or convert() refuses: by steps of twice that, or with a
+  /// finer `step` by those codes within reach that vary least (docs/decisions/0067).
   std::optional<double> max_rounding;
   /// What to do with elevations outside z_range: false refuses, true moves them to its end and counts them.
   bool clamp_range = false;

@@ -143,6 +143,8 @@ struct Metadata {
   Quantisation quantisation;
   /// Elevations that nothing stored lies beyond, by the user's choice: offset and a whole number of steps more.
   std::optional<std::pair<double, double>> z_range;
+  /// How far a stored elevation may lie from what was computed; nullopt for half a step. Vertical units.
+  std::optional<double> rounding;
   std::string horizontal_unit = "unknown";  ///< world units: "metre" or "unknown"
   std::string vertical_unit = "unknown";    ///< "metre", "foot", ... or "unknown"
   WorldBounds valid;  ///< the part of the world that the source covers; a rectangle around it where it was projected

@@ -54,14 +54,15 @@ class MemorySource final : public ByteSource {
   std::vector<std::byte> bytes_;
 };
 
+}  // namespace
+
 void require_range(const ByteSource& source, std::uint64_t offset_bytes, std::uint64_t size_bytes) {
   const std::uint64_t all = source.size_bytes();
   if (offset_bytes > all || size_bytes > all - offset_bytes) {
-    throw Error(ErrorCode::kIo, fmt::format("ends at byte {}, before byte {}", all, offset_bytes + size_bytes));
+    throw Error(ErrorCode::kIo,
+                fmt::format("ends at byte {}, before the end of {} bytes at byte {}", all, size_bytes, offset_bytes));
   }
 }
-
-}  // namespace
 
 std::shared_ptr<const ByteSource> open_file_source(const std::string& path) {
   return std::make_shared<FileSource>(path);

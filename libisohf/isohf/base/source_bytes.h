@@ -9,6 +9,9 @@
 
 namespace isohf {
 
+/// Throws Error{kIo} where the source ends before a range does, which may be anything that a file claims.
+void require_range(const ByteSource& source, std::uint64_t offset_bytes, std::uint64_t size_bytes);
+
 /// Fills `out`. Throws Error{kIo} where the source ends before that, and what the source throws.
 void read_exactly(const ByteSource& source, std::uint64_t offset_bytes, std::span<std::byte> out);
 

@@ -250,8 +250,8 @@ std::vector<Window> spread_windows(const SourceInfo& info) {
 /// The step that elevations will have, so far as the samples need not be known for it; else 0.
 double expected_step(const SourceInfo& info, const ConvertOptions& options) {
   if (options.code_type == CodeType::kF32) return 0.0;
-  if (options.max_rounding) return 2.0 * *options.max_rounding;
   if (options.step) return *options.step;
+  if (options.max_rounding) return 2.0 * *options.max_rounding;
   if (options.max_error) return *options.max_error / 4.0;
   return is_floating(info.sample_type) || options.code_type != CodeType::kU16 ? 0.0 : std::abs(info.z_scale) / 2.0;
 }

@@ -115,9 +115,9 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
       plan.grid.extent_z(), plan.frame.first_sample_x, plan.frame.first_sample_z, plan.frame.spacing_x,
       plan.frame.spacing_z, to_string(plan.outside), to_string(options.code_type),
       options.z_range ? fmt::format("{}:{}", options.z_range->first, options.z_range->second) : "data",
-      options.max_rounding ? fmt::format("rounding {}", *options.max_rounding)
-      : options.step       ? fmt::format("{}", *options.step)
-                           : "auto",
+      options.step           ? fmt::format("{}", *options.step)
+      : options.max_rounding ? fmt::format("rounding {}", *options.max_rounding)
+                             : "auto",
       options.clamp_range, to_string(options.filter.value_or(kDefaultFilter)), to_string(options.acquisition),
       options.level,
       options.shadow_seeds
@@ -131,6 +131,7 @@ std::string fingerprint(const SourceInfo& info, const Plan& plan, const ConvertO
   if (of_files && !options.source_note.fingerprint.empty()) job += " | " + options.source_note.fingerprint;
   if (const std::string& datum = info.georeference.system.vertical_datum; !datum.empty()) job += " | above " + datum;
   if (of_files && !options.planes) job += " | no planes";
+  if (options.step && options.max_rounding) job += fmt::format(" | rounding {}", *options.max_rounding);
   if (options.max_error) job += fmt::format(" | max error {}", *options.max_error);
   if (plan.frame.projection) {
     const ProjectionRecord& on = *plan.frame.projection;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/planes/plane_builder.h"
@@ -63,6 +64,7 @@ class Estimate {
         std::min(rounded(grid.shape().columns() * 2.0 * grid.sigma_x() / plan.frame.spacing_x) + taps + 2, info_.width);
     reads_whole_rows_ = plan.frame.warp || plan.frame.wraps_x;
     has_bands_ = !prefilter.is_identity() || plan.frame.warp;
+    if (options.step && options.max_rounding) smoothing_ = Prefilter::smoothing(Edges::kOdd);
   }
 
   [[nodiscard]] MemoryPlan with(const Ration& ration, bool in_scratch) const {
@@ -78,11 +80,12 @@ class Estimate {
     memory.members_at_once = ration.members_at_once;
     memory.tile_columns_at_once = grid.tile_columns();
     if (in_scratch) {
-      const std::int64_t in_use = prefilter_.is_identity() ? parts_in_flight(memory, grid.tile_columns()) * tile_rows_
-                                                           : tile_rows_ + 2 * prefilter_.halo();
+      std::int64_t in_use = prefilter_.is_identity() ? parts_in_flight(memory, grid.tile_columns()) * tile_rows_
+                                                     : tile_rows_ + 2 * prefilter_.halo();
+      if (smoothing_) in_use = std::max(in_use, tile_rows_ + 2 * smoothing_->halo());
       memory.scratch_rows = std::min(SourceRows::kept_rows_for(memory.read_step, in_use), info_.height);
-      memory.scratch_bytes = static_cast<std::uint64_t>(memory.scratch_rows) * row_bytes();
-      if (has_bands_ && !reads_whole_rows_) choose_columns(memory);
+      memory.scratch_bytes = static_cast<std::uint64_t>(memory.scratch_rows) * row_bytes() * (smoothing_ ? 2 : 1);
+      if ((has_bands_ || smoothing_) && !reads_whole_rows_) choose_columns(memory);
     }
     memory.bytes = total(memory);
     // Where it helps: buffers for a file take as much as a few tiles.
@@ -135,8 +138,11 @@ class Estimate {
                            static_cast<double>(map_bytes());
     const double seeds =
         options_.shadow_seeds ? static_cast<double>(SeedRow::memory_bytes(plan_.grid, memory.seeds_in_scratch)) : 0.0;
-    const double tiles =
-        tiles_pass(memory) + seeds + static_cast<double>(plane_bytes(memory)) + static_cast<double>(texture_bytes_);
+    const auto waiting =
+        std::min(static_cast<double>(memory.tiles_in_flight), static_cast<double>(plan_.grid.tile_count()));
+    const double tiles = waiting * vertices * kWaitingBytesPerVertex + source_pass(memory, prefilter_, has_bands_) +
+                         (smoothing_ ? source_pass(memory, *smoothing_, true) : 0.0) + seeds +
+                         static_cast<double>(plane_bytes(memory)) + static_cast<double>(texture_bytes_);
     double peak = std::max(scan_pass(memory), tiles);
     if (options_.lossless) {
       peak += static_cast<double>(residual_stage_kept_bytes(info_, plan_, memory.residuals_in_scratch));
@@ -159,14 +165,12 @@ class Estimate {
            edge_rows * sizeof(float) * static_cast<double>(info_.width);
   }
 
-  [[nodiscard]] double tiles_pass(const MemoryPlan& memory) const {
-    const auto vertices = static_cast<double>(plan_.grid.shape().stored_vertex_count());
-    const auto waiting =
-        std::min(static_cast<double>(memory.tiles_in_flight), static_cast<double>(plan_.grid.tile_count()));
-    double bytes = waiting * vertices * kWaitingBytesPerVertex;
+  /// The source's rows, and what tiles are cut from.
+  [[nodiscard]] double source_pass(const MemoryPlan& memory, const Prefilter& prefilter, bool has_bands) const {
+    double bytes = 0.0;
     const std::int64_t step = memory.read_step.rows;
     // Slabs that hold the rows of two rows of tiles, wherever they begin; the prefilter copies what it needs at once.
-    const std::int64_t in_use = prefilter_.is_identity()
+    const std::int64_t in_use = prefilter.is_identity()
                                     ? parts_in_flight(memory, plan_.grid.tile_columns()) * tile_rows_
                                     : std::min(tile_rows_, step);
     const std::int64_t slabs = std::min((in_use + step - 2) / step + 1, (info_.height + step - 1) / step);
@@ -177,17 +181,17 @@ class Estimate {
     } else {
       bytes += static_cast<double>(memory.read_step.most_bytes(info_));
     }
-    if (!has_bands_) {
+    if (!has_bands) {
       return bytes + threads_ * static_cast<double>(tile_rows_) * static_cast<double>(tile_columns_) * sizeof(float);
     }
     const double columns = std::min(static_cast<double>(info_.width), static_cast<double>(memory.tile_columns_at_once) *
                                                                           static_cast<double>(tile_columns_));
     // Strips of columns that the threads filter, doubles.
-    const double strips = threads_ * 64.0 * 12.0 * static_cast<double>(tile_rows_ + 2 * prefilter_.halo());
+    const double strips = threads_ * 64.0 * 12.0 * static_cast<double>(tile_rows_ + 2 * prefilter.halo());
     // Pieces of changing sizes leave gaps in the heap, in that of every thread (measured).
     const double gaps = memory.scratch_rows > 0 ? 1.0 + 0.2 * threads_ : 1.0;
     const std::uint64_t bands =
-        BandReader::memory_bytes(prefilter_, parts_in_flight(memory, memory.tile_columns_at_once), tile_rows_,
+        BandReader::memory_bytes(prefilter, parts_in_flight(memory, memory.tile_columns_at_once), tile_rows_,
                                  static_cast<std::int64_t>(columns), info_);
     return bytes + strips + gaps * static_cast<double>(bands);
   }
@@ -200,10 +204,11 @@ class Estimate {
   std::uint64_t limit_;
   const Prefilter& prefilter_;
   int threads_;
-  bool reads_whole_rows_ = false;  ///< tiles of a row are cut from whole rows of the source
-  bool has_bands_ = false;         ///< of heights or coefficients, instead of tiles' own pieces
-  std::int64_t tile_rows_ = 0;     ///< of the source, that a row of tiles reads
-  std::int64_t tile_columns_ = 0;  ///< of the source, that a tile reads
+  std::optional<Prefilter> smoothing_;  ///< where codes may be chosen from several
+  bool reads_whole_rows_ = false;       ///< tiles of a row are cut from whole rows of the source
+  bool has_bands_ = false;              ///< of heights or coefficients, instead of tiles' own pieces
+  std::int64_t tile_rows_ = 0;          ///< of the source, that a row of tiles reads
+  std::int64_t tile_columns_ = 0;       ///< of the source, that a tile reads
 };
 
 }  // namespace

@@ -26,11 +26,11 @@
 #include "isohf/convert/job_description.h"
 #include "isohf/convert/memory_plan.h"
 #include "isohf/convert/stages/choose_quantisation.h"
+#include "isohf/convert/stages/code_source.h"
 #include "isohf/convert/stages/plane_stage.h"
 #include "isohf/convert/stages/residual_stage.h"
 #include "isohf/convert/stages/seed_stage.h"
 #include "isohf/convert/stages/texture_stage.h"
-#include "isohf/convert/stages/tile_source.h"
 #include "isohf/convert/stages/tiles_around.h"
 #include "isohf/error.h"
 
@@ -48,7 +48,7 @@ struct Outliers {
 /// A tile on its way through the pipeline.
 struct TileJob {
   TileIndex index{};
-  std::shared_ptr<const TileSource::Part> part;
+  std::shared_ptr<const CodeSource::Part> part;
   EncodedTile encoded;
   Outliers outliers;
   PlaneSample planes;
@@ -106,28 +106,28 @@ struct VoidTile {
         encoded(encode_tile(conversion.plan.grid.shape(), codes, conversion.options.level)) {}
 };
 
-void make_tile(const Conversion& conversion, const TileSource& source, const CountedVertices& counted,
+void make_tile(const Conversion& conversion, const CodeSource& source, const CountedVertices& counted,
                const VoidTile& nothing, const Stages& stages, bool is_new, TileJob& tile) {
   const TileShape& shape = conversion.plan.grid.shape();
-  std::vector<float> heights(static_cast<std::size_t>(shape.stored_vertex_count()));
-  if (!source.cut(tile.index, *tile.part, heights)) {
+  std::vector<float> heights;
+  TileCodes codes;
+  const std::optional<QuantiserCounts> counts = source.cut(tile.index, *tile.part, heights, codes);
+  if (!counts) {
     tile.encoded = nothing.encoded;
     tile.encoded.statistics = tile_statistics(counted, tile.index, nothing.codes, conversion.quantisation);
     if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(nothing.codes);
     tile.seeds.is_empty = true;
     return;
   }
-  TileCodes codes;
-  const QuantiserCounts counts = quantise(conversion.quantisation, conversion.limits, conversion.datum, heights, codes);
   // Without a range from the user the codes reach over all that there is.
-  if (conversion.options.z_range || counts.below + counts.above > 0) {
+  if (conversion.options.z_range || counts->below + counts->above > 0) {
     tile.outliers = find_outliers(shape, conversion.limits, conversion.datum, heights);
   }
   EncodedTile& encoded = tile.encoded;
   encoded = encode_tile(shape, codes, conversion.options.level);
   encoded.statistics = tile_statistics(counted, tile.index, codes, conversion.quantisation);
   encoded.statistics.clamped = tile.outliers.visible;
-  encoded.statistics.worst_rounding = counts.worst_rounding;
+  encoded.statistics.worst_rounding = counts->worst_rounding;
   if (stages.planes != nullptr && is_new) tile.planes = stages.planes->sample(codes, encoded);
   if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(codes);
   tile.seeds.is_empty = encoded.is_empty;
@@ -138,8 +138,7 @@ void make_tile(const Conversion& conversion, const TileSource& source, const Cou
 /// number of parts of the source: one that is being cut and one that is being read.
 void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stages& stages) {
   const TileGrid& grid = conversion.plan.grid;
-  const CodeLimits& limits = conversion.limits;
-  TileSource source(conversion, {limits.lowest - conversion.datum, limits.highest - conversion.datum});
+  CodeSource source(conversion);
   const CountedVertices counted(
       describe_job(conversion.source.info(), conversion.plan, conversion.options, conversion.quantisation));
   const VoidTile nothing(conversion);
@@ -147,7 +146,7 @@ void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stag
   std::int64_t next = stages.seeds != nullptr
                           ? std::max(SeedStage::first_tile_needed(grid, first_new), conversion.first_tile)
                           : first_new;
-  std::shared_ptr<const TileSource::Part> part;
+  std::shared_ptr<const CodeSource::Part> part;
 
   // Tiles leave the pipeline in the order in which they enter it, so that a ring of as many as may be in flight always
   // has the next one free. The pipeline itself only hands on pointers: it forgets to destroy what it holds when a stage
@@ -244,7 +243,8 @@ void check(const ConvertOptions& options) {
   };
   check_positive("`max_rounding`", options.max_rounding);
   check_positive("`max_error`", options.max_error);
-  if (options.step && options.max_rounding) refuse("both `step` and `max_rounding` are given; give one");
+  if (options.step && options.max_rounding && *options.step == 0.0)
+    refuse("`max_rounding` is given beside the finest step; give a step, or one of the two");
   if (!options.texture) return;
   if (options.texture->photo == nullptr) refuse("`texture` has no photo");
   require_known("`texture`: its format", options.texture->format.value_or(TextureFormat::kPng), TextureFormat::kJpeg);
@@ -303,14 +303,8 @@ AccuracyReport measure(const std::string& archive, const Conversion& conversion)
   return compare_with_source(reader, conversion.source, conversion.job);
 }
 
-AccuracyInfo info_of(const AccuracyReport& report, const ConvertOptions& options, const Quantisation& quantisation,
-                     double worst_rounding) {
-  return {report.samples_compared,
-          report.samples_lost,
-          report.rms,
-          report.max,
-          options.max_error,
-          options.code_type == CodeType::kF32 ? worst_rounding : 0.5 * quantisation.scale};
+AccuracyInfo info_of(const AccuracyReport& report, const ConvertOptions& options, double rounding) {
+  return {report.samples_compared, report.samples_lost, report.rms, report.max, options.max_error, rounding};
 }
 
 }  // namespace
@@ -477,6 +471,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
     refuse_warnings(summary, options);
     metadata = describe_job(info, plan, options, conversion.quantisation);
     metadata.statistics = total_statistics(all);
+    if (conversion.most_off() > 0.0) metadata.rounding = conversion.most_off();
     summary.plane_bytes = writer.members_in("planes/").bytes;
     if (seeds) {
       const ShadowSeedInfo record = seeds->info(writer);
@@ -509,7 +504,10 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
     if (options.measure || options.max_error) {
       writer.complete(metadata);
       result.measured = measure(writer.part(), conversion);
-      const AccuracyInfo found = info_of(*result.measured, options, metadata.quantisation, all.worst_rounding);
+      const AccuracyInfo found =
+          info_of(*result.measured, options,
+                  options.code_type == CodeType::kF32 ? all.worst_rounding
+                                                      : metadata.rounding.value_or(0.5 * metadata.quantisation.scale));
       result.is_finished = !options.max_error || found.max <= *options.max_error;
       if (result.is_finished) metadata.extensions.emplace_back(kAccuracyName, format_accuracy_info(found));
     }

@@ -46,7 +46,7 @@ class VertexCheck {
                                      : ElevationRange{statistics.min.value_or(0.0), statistics.max.value_or(0.0)};
     datum_ = choose_datum(range);
     const double largest = std::max(std::abs(range.min), std::abs(range.max));
-    const double stored = q.type == CodeType::kF32 ? 0x1p-24 * largest : 0.5 * q.scale;
+    const double stored = q.type == CodeType::kF32 ? 0x1p-24 * largest : metadata_.rounding.value_or(0.5 * q.scale);
     report_.bound = stored + height_error(kernel_, prefilter_, range, datum_);
     can_clamp_ = metadata_.z_range || statistics.clamped > 0;
   }

@@ -158,8 +158,14 @@ TEST_F(ConvertCommand, MaxRoundingBoundsEveryVertex) {
   EXPECT_LE(vertices.at("worst").get<double>(), 0.125 + 1e-3);  // heights are floats of some hundred units
   EXPECT_GT(vertices.at("worst").get<double>(), 0.12);
   EXPECT_LE(vertices.at("bound").get<double>(), 0.125 + 1e-3);
+  // With a finer step too; a coarser one cannot hold it.
+  convert("b.isohf", {"--quiet", "--max-rounding", "1", "--step", "1.4"});
+  const json of_finer =
+      json::parse(run_isohf({"verify", folder / "b.isohf", "--against", folder / "a.tif", "--json"}).out);
+  EXPECT_EQ(of_finer.at("against").at("vertices").at("wrong"), 0);
+  EXPECT_GT(of_finer.at("against").at("vertices").at("worst").get<double>(), 0.75) << "codes were chosen";
   const RunResult both =
-      run_isohf({"convert", folder / "a.tif", folder / "b.isohf", "--max-rounding", "1", "--step", "1"});
+      run_isohf({"convert", folder / "a.tif", folder / "c.isohf", "--max-rounding", "1", "--step", "3"});
   EXPECT_EQ(both.exit_code, 2);
   EXPECT_THAT(both.err, HasSubstr("--max-rounding"));
 }

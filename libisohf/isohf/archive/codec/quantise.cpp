@@ -1,8 +1,10 @@
 #include "isohf/archive/codec/quantise.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
+#include "isohf/base/assert.h"
 #include "isohf/base/simd.h"
 
 namespace isohf {
@@ -46,6 +48,30 @@ ISOHF_KERNEL void round_to_codes(const float* __restrict heights, std::size_t co
   line.above = above;
 }
 
+/// round_to_codes(), but for the codes that are chosen: the nearest to `smooth` within `reach` codes of what is exact.
+ISOHF_KERNEL void round_within_reach(const float* __restrict heights, const float* __restrict smooth, std::size_t count,
+                                     double reach, CodeLine& line, std::uint16_t* __restrict codes) {
+  const double last = line.last;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double exact = double{heights[i]} * line.inverse + line.shift;
+    if (exact != exact) {
+      codes[i] = static_cast<std::uint16_t>(line.void_code);
+      continue;
+    }
+    const double inside = std::min(std::max(exact, 0.0), last);
+    const double nearest = std::floor(inside + 0.5);
+    const double least = std::max(std::ceil(inside - reach), 0.0);
+    const double most = std::min(std::floor(inside + reach), last);
+    const double wanted = std::floor(double{smooth[i]} * line.inverse + line.shift + 0.5);  // NaN compares false
+    double code = wanted < least ? least : (wanted > most ? most : wanted);
+    code = wanted == wanted && least <= most ? code : nearest;
+    line.below += exact < -0.5 ? 1 : 0;
+    line.above += exact >= last + 0.5 ? 1 : 0;
+    line.worst = std::max(line.worst, std::abs(inside - code));
+    codes[i] = static_cast<std::uint16_t>(static_cast<std::int32_t>(code));
+  }
+}
+
 /// Heights by `datum` higher; the largest rounding, voids left aside. Floats that are not negative are ordered like
 /// their bits, and a maximum of integers vectorises.
 ISOHF_KERNEL float raise_heights(const float* __restrict heights, std::size_t count, double datum,
@@ -60,6 +86,27 @@ ISOHF_KERNEL float raise_heights(const float* __restrict heights, std::size_t co
     raised[i] = rounded;
   }
   return std::bit_cast<float>(worst);
+}
+
+/// A tile of `count` codes, which are yet to be chosen.
+CodeLine start_line(const Quantisation& quantisation, const CodeLimits& limits, double datum, std::size_t count,
+                    TileCodes& tile) {
+  tile.type = quantisation.type;
+  tile.heights.clear();
+  tile.codes.resize(count);
+  CodeLine line;
+  line.inverse = 1.0 / quantisation.scale;
+  line.shift = (datum - quantisation.offset) * line.inverse;
+  line.last = static_cast<double>(quantisation.max_code());
+  if (limits.highest < code_limits(quantisation).highest) {
+    line.last = std::round((limits.highest - quantisation.offset) / quantisation.scale);
+  }
+  line.void_code = static_cast<std::int32_t>(quantisation.void_code());
+  return line;
+}
+
+QuantiserCounts counts_of(const CodeLine& line, const Quantisation& quantisation) {
+  return {line.below, line.above, line.worst * quantisation.scale};
 }
 
 /// The float that is nearest to `limit` on the side of `inner`, or `limit` itself.
@@ -91,21 +138,19 @@ QuantiserCounts quantise(const Quantisation& quantisation, const CodeLimits& lim
     for (float& height : tile.heights) height = height < lowest ? lowest : (height > highest ? highest : height);
     return counts;
   }
-  tile.heights.clear();
-  tile.codes.resize(n);
-  CodeLine line;
-  line.inverse = 1.0 / quantisation.scale;
-  line.shift = (datum - quantisation.offset) * line.inverse;
-  line.last = static_cast<double>(quantisation.max_code());
-  if (limits.highest < code_limits(quantisation).highest) {
-    line.last = std::round((limits.highest - quantisation.offset) / quantisation.scale);
-  }
-  line.void_code = static_cast<std::int32_t>(quantisation.void_code());
+  CodeLine line = start_line(quantisation, limits, datum, n, tile);
   vectorised<round_to_codes>(heights.data(), n, line, tile.codes.data());
-  counts.below = line.below;
-  counts.above = line.above;
-  counts.worst_rounding = line.worst * quantisation.scale;
-  return counts;
+  return counts_of(line, quantisation);
+}
+
+QuantiserCounts quantise_within(const Quantisation& quantisation, const CodeLimits& limits, double datum,
+                                double most_off, std::span<const float> heights, std::span<const float> smooth,
+                                TileCodes& tile) {
+  ISOHF_ASSERT(quantisation.type != CodeType::kF32 && smooth.size() == heights.size());
+  CodeLine line = start_line(quantisation, limits, datum, heights.size(), tile);
+  vectorised<round_within_reach>(heights.data(), smooth.data(), heights.size(), most_off * line.inverse, line,
+                                 tile.codes.data());
+  return counts_of(line, quantisation);
 }
 
 CodeLimits code_limits(const Quantisation& quantisation) {

@@ -32,6 +32,11 @@ struct CodeLimits {
 /// heights [n]   tile out, resized to n. Rounds halves up. O(n), vectorised.
 QuantiserCounts quantise(const Quantisation& quantisation, const CodeLimits& limits, double datum,
                          std::span<const float> heights, TileCodes& tile);
+/// The same of codes alone, each the nearest to `smooth`, heights likewise, of those that lie within `most_off` of the
+/// elevation; where none does, or `smooth` is NaN, the nearest to the elevation. most_off > half a step.
+QuantiserCounts quantise_within(const Quantisation& quantisation, const CodeLimits& limits, double datum,
+                                double most_off, std::span<const float> heights, std::span<const float> smooth,
+                                TileCodes& tile);
 /// With all the codes that there are.
 QuantiserCounts quantise(const Quantisation& quantisation, double datum, std::span<const float> heights,
                          TileCodes& tile);

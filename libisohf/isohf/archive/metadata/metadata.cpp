@@ -131,8 +131,11 @@ void sample_members(JsonMembers& json, Metadata& metadata) {
   const bool is_float = codes.type == CodeType::kF32;
   json.derived("void", is_float ? Json("nan") : Json(codes.void_code()), {{"type", {"string", "integer"}}});
   json("range", metadata.z_range, kAbsent);
+  json("rounding", metadata.rounding, {.presence = JsonRule::kAbsent, .least = 0.0, .above_least = true});
   if (is_float && (codes.offset != 0.0 || codes.scale != 1.0))
     refuse_metadata("samples", "offset and scale of f32 must be 0 and 1");
+  if (metadata.rounding && (is_float || *metadata.rounding < 0.5 * codes.scale))
+    refuse_metadata("samples.rounding", "must be half of the scale or more, and absent for f32");
   if (metadata.z_range && !(metadata.z_range->first <= metadata.z_range->second))
     json.refuse("range", "is not the smaller number first");
 }

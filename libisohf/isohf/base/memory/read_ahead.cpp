@@ -8,9 +8,10 @@ std::span<const std::byte> ReadAhead::bytes(const ByteSource& source, std::uint6
   const bool is_here =
       source_ == &source && offset >= offset_ && offset - offset_ + size <= static_cast<std::uint64_t>(piece_.size());
   if (!is_here) {
-    source_ = nullptr;  // where reading fails
+    require_range(source, offset, size);  // before room is made for what is claimed
+    source_ = nullptr;                    // where reading fails
     const std::uint64_t end = std::min(source.size_bytes(), offset + std::max(size, kPieceBytes));
-    piece_.resize(std::max(end, offset + size) - offset);
+    piece_.resize(end - offset);
     read_exactly(source, offset, piece_);
     source_ = &source;
     offset_ = offset;

@@ -50,13 +50,22 @@ struct Texture {
   TableRecord record;
 };
 
+std::span<const std::byte> bytes_of(const ArchiveReader& from, std::uint64_t offset, std::uint64_t size,
+                                    ReadAhead& ahead) {
+  try {
+    return ahead.bytes(from.source(), offset, size);
+  } catch (const Error& error) {
+    throw error.within(from.path());
+  }
+}
+
 /// A tile's record and bytes.
 EncodedTile encoded_tile(const ArchiveReader& from, TileIndex index, int plane, ReadAhead& ahead) {
   EncodedTile encoded;
   const TileEntry entry = from.tile_entry(index, plane);
   encoded.is_empty = !entry.stored;
   if (encoded.is_empty) return encoded;
-  const auto data = ahead.bytes(from.source(), entry.offset_bytes, entry.compressed_bytes);
+  const auto data = bytes_of(from, entry.offset_bytes, entry.compressed_bytes, ahead);
   encoded.deflated.assign(data.begin(), data.end());
   encoded.payload_bytes = entry.payload_bytes;
   encoded.payload_crc32 = entry.payload_crc32;
@@ -301,7 +310,7 @@ void Assembly::make_void(TileIndex index, EncodedTile& tile) const {
 }
 
 void copy_member(const ArchiveReader& from, const MemberEntry& member, ArchiveWriter& writer, ReadAhead& ahead) {
-  const auto data = ahead.bytes(from.source(), member.offset_bytes, member.compressed_bytes);
+  const auto data = bytes_of(from, member.offset_bytes, member.compressed_bytes, ahead);
   if (member.deflated) writer.add_deflated_member(member.name, data, member.bytes, member.crc32);
   if (!member.deflated) writer.add_member(member.name, data, false);
 }

@@ -102,7 +102,7 @@ void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std
 /// The range of the surface itself, for kernels that leave the range of their samples: cuts every tile, keeps none.
 ElevationRange measure_surface(const Conversion& conversion, const ElevationRange& limits) {
   const TileGrid& grid = conversion.plan.grid;
-  TileSource tiles(conversion, {limits.min - conversion.datum, limits.max - conversion.datum});
+  TileSource tiles(conversion, {limits.min - conversion.datum, limits.max - conversion.datum}, conversion.prefilter);
   std::vector<ElevationRange> ranges(static_cast<std::size_t>(grid.tile_columns()), {HUGE_VAL, -HUGE_VAL});
   std::int64_t next = 0;
   while (next < grid.tile_count()) {

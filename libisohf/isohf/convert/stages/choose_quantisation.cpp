@@ -30,9 +30,17 @@ double codes_needed(const ElevationRange& range, double step) {
 
 /// The step that is asked for or that suits the source; nullopt: the finest.
 std::optional<double> wanted_step(const QuantisationRequest& request, const SourceInfo& info) {
-  const std::optional<double> step =
-      request.max_rounding ? 2.0 * (*request.max_rounding - request.height_error) : request.step;
-  if (request.max_rounding && !(*step > 0.0)) {
+  const std::optional<double> most =
+      request.max_rounding ? std::optional(2.0 * (*request.max_rounding - request.height_error)) : std::nullopt;
+  const std::optional<double> step = request.step ? request.step : most;
+  if (request.step && most && *step > *most) {
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("step {} rounds by up to {:.6g}, more than `max_rounding` {}; use a step of {:.6g} or less, or "
+                    "leave it out",
+                    *step, *step / 2.0 + request.height_error, *request.max_rounding, *most));
+  }
+  if (most && !(*most > 0.0)) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("`max_rounding` {} is below what sums in single precision hold of elevations so far from "
                             "each other; use {:.3g} or more",
@@ -54,6 +62,12 @@ std::optional<double> wanted_step(const QuantisationRequest& request, const Sour
   return std::nullopt;
 }
 
+/// Up to that steps are doubled where the range needs it, and whole elevations stay whole; beyond, few would, and the
+/// finest step is nearer to all.
+double whole_step(const SourceInfo& info) {
+  return is_floating(info.sample_type) ? 0.0 : std::abs(info.z_scale);
+}
+
 bool is_asked_for(const QuantisationRequest& request) {
   return request.max_rounding || (request.step && *request.step != 0.0);
 }
@@ -61,7 +75,7 @@ bool is_asked_for(const QuantisationRequest& request) {
 [[noreturn]] void refuse_step(const QuantisationRequest& request, double steps, const ElevationRange& range,
                               double codes, bool divides_range) {
   const double finest = divides_range ? (range.max - range.min) / codes : finest_step(range, codes) * 1.0001;
-  const bool by_rounding = request.max_rounding.has_value();
+  const bool by_rounding = !request.step;
   const double wanted = by_rounding ? finest / 2.0 + request.height_error : finest;
   throw Error(ErrorCode::kInvalidArgument,
               fmt::format("{} {} needs {:.0f} codes for elevations {} to {}, {} has {:.0f}; use {:.{}g}{}, or "
@@ -83,25 +97,25 @@ Quantisation choose_quantisation(const QuantisationRequest& request, const Eleva
   quantisation.type = request.type;
   if (request.type == CodeType::kF32) return quantisation;
   const auto codes = static_cast<double>(quantisation.max_code());
+  const auto finest = [&] {
+    quantisation.scale = finest_step(range, codes);
+    quantisation.offset = range.min;
+    return quantisation;
+  };
   if (const std::optional<double> step = wanted_step(request, info)) {
     quantisation.scale = *step;
     if (is_asked_for(request)) {
       if (codes_needed(range, *step) > codes) refuse_step(request, codes_needed(range, *step), range, codes, false);
     } else {
-      while (codes_needed(range, quantisation.scale) > codes) quantisation.scale *= 2.0;
-      // A bound on the error that doubled steps would use up by themselves is met by the finest.
-      if (request.wish && quantisation.scale >= 4.0 * *request.wish && finest_step(range, codes) < quantisation.scale) {
-        quantisation.scale = finest_step(range, codes);
-        quantisation.offset = range.min;
-        return quantisation;
+      while (codes_needed(range, quantisation.scale) > codes && quantisation.scale < whole_step(info)) {
+        quantisation.scale *= 2.0;
       }
+      if (codes_needed(range, quantisation.scale) > codes) return finest();
     }
     quantisation.offset = std::floor(range.min / quantisation.scale) * quantisation.scale;
     return quantisation;
   }
-  quantisation.scale = finest_step(range, codes);
-  quantisation.offset = range.min;
-  return quantisation;
+  return finest();
 }
 
 Quantisation quantisation_of_range(const QuantisationRequest& request, const ElevationRange& range,
@@ -120,7 +134,7 @@ Quantisation quantisation_of_range(const QuantisationRequest& request, const Ele
   if (std::optional<double> step = wanted_step(request, info)) {
     steps = steps_of(*step);
     if (is_asked_for(request)) {
-      if (steps > codes) refuse_step(request, steps, range, codes, !request.max_rounding);
+      if (steps > codes) refuse_step(request, steps, range, codes, request.step.has_value());
       if (request.step && std::abs(span / *step - steps) > 1e-9 * steps) {
         throw Error(ErrorCode::kInvalidArgument,
                     fmt::format("`step` {} does not divide `z_range` {}:{}, whose ends are both codes: {:.6g} steps; "
@@ -129,7 +143,8 @@ Quantisation quantisation_of_range(const QuantisationRequest& request, const Ele
                                 range.min + steps * *step, *step / 2.0 + request.height_error));
       }
     }
-    while (steps > codes) steps = steps_of(*step *= 2.0);
+    while (steps > codes && *step < whole_step(info)) steps = steps_of(*step *= 2.0);
+    steps = std::min(steps, codes);
   }
   quantisation.offset = range.min;
   quantisation.scale = span / steps;

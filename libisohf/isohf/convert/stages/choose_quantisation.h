@@ -15,15 +15,16 @@ namespace isohf {
 struct QuantisationRequest {
   CodeType type = CodeType::kU16;
   std::optional<double> step;  ///< elevation of one code; 0: the finest that the type holds; nullopt: chosen
-  std::optional<double> max_rounding = {};  ///< instead: half a step and height_error are at most that
+  std::optional<double> max_rounding = {};  ///< half a step and height_error are at most that; alone: as near as can be
   double height_error = 0.0;                ///< how far heights are off before they are rounded
   std::optional<double> wish = {};          ///< where neither is given: a step of about that, or as fine as can be
 };
 
 /// One scale and offset for the whole dataset.
 ///
-/// The chosen step is half of the source's own for integer samples, doubled until the range fits, and the finest
-/// that fits for floats. The offset is a multiple of the step, so that whole elevations stay whole.
+/// The chosen step is half of the source's own for integer samples, or that where the range needs it, and the finest
+/// that fits for floats and for wider ranges. But for the finest the offset is a multiple of the step, so that whole
+/// elevations stay whole.
 /// Throws Error{kInvalidArgument} where a step that was asked for needs more codes than the type has, naming the
 /// smallest one that fits.
 [[nodiscard]] Quantisation choose_quantisation(const QuantisationRequest& request, const ElevationRange& range,

@@ -26,13 +26,14 @@ struct TileSource::Windows {
   oneapi::tbb::enumerable_thread_specific<Window> of_thread;
 };
 
-TileSource::TileSource(const Conversion& conversion, const ElevationRange& limits)
+TileSource::TileSource(const Conversion& conversion, const ElevationRange& limits, const Prefilter& prefilter)
     : conversion_(conversion),
+      prefilter_(prefilter),
       cutter_(conversion.cutter(limits)),
-      cuts_windows_(conversion.prefilter.is_identity() && !conversion.plan.frame.warp),
+      cuts_windows_(prefilter_.is_identity() && !conversion.plan.frame.warp),
       reads_whole_rows_(conversion.plan.frame.warp || conversion.plan.frame.wraps_x),
       rows_(make_rows(conversion)),
-      bands_(rows_, conversion.datum, conversion.prefilter, conversion.geometry().wraps_x),
+      bands_(rows_, conversion.datum, prefilter_, conversion.geometry().wraps_x),
       windows_(std::make_unique<Windows>()) {
   for (std::int64_t column = 0; column < conversion.plan.grid.tile_columns(); ++column) {
     columns_needed_.push_back(cutter_->columns_needed(column));

@@ -17,8 +17,8 @@ namespace isohf {
 /// one, bands of as many tiles as memory allows are filtered first.
 class TileSource {
  public:
-  /// `limits` as TileResampler's. The conversion outlives it.
-  TileSource(const Conversion& conversion, const ElevationRange& limits);
+  /// `limits` as TileResampler's. `prefilter` is the kernel's, or smooths. The conversion outlives it.
+  TileSource(const Conversion& conversion, const ElevationRange& limits, const Prefilter& prefilter);
   ~TileSource();
 
   /// Tiles of one row that are cut from the same rows of the source.
@@ -46,6 +46,7 @@ class TileSource {
   struct Windows;
 
   const Conversion& conversion_;
+  Prefilter prefilter_;
   std::unique_ptr<TileResampler> cutter_;
   bool cuts_windows_;  ///< tiles have their own pieces of the source
   bool reads_whole_rows_;

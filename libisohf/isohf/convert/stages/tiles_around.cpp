@@ -2,11 +2,10 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
-#include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/codec/tile_decoder.h"
 #include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/deflate/deflate.h"
-#include "isohf/convert/stages/tile_source.h"
+#include "isohf/convert/stages/code_source.h"
 
 namespace isohf {
 namespace {
@@ -24,23 +23,20 @@ TilesAround::TilesAround(const Conversion& conversion, const RowRange& north, co
 
 void TilesAround::make(const RowRange& rows) {
   const TileGrid& grid = conversion_.plan.grid;
-  const CodeLimits& limits = conversion_.limits;
-  const double datum = conversion_.datum;
-  TileSource source(conversion_, {limits.lowest - datum, limits.highest - datum});
+  CodeSource source(conversion_);
   std::int64_t next = rows.first * grid.tile_columns();
   const std::int64_t end = (rows.last + 1) * grid.tile_columns();
   while (next < end) {
     conversion_.job.throw_if_cancelled();
     const std::int64_t first = next;
-    const std::shared_ptr<const TileSource::Part> part = source.read(grid.tile_at(first));
+    const std::shared_ptr<const CodeSource::Part> part = source.read(grid.tile_at(first));
     while (next < end && part->holds(grid.tile_at(next))) ++next;
     std::vector<EncodedTile> made(static_cast<std::size_t>(next - first));
     oneapi::tbb::parallel_for(std::size_t{0}, made.size(), [&](std::size_t i) {
-      std::vector<float> heights(static_cast<std::size_t>(grid.shape().stored_vertex_count()));
-      made[i].is_empty = true;
-      if (!source.cut(grid.tile_at(first + static_cast<std::int64_t>(i)), *part, heights)) return;
+      std::vector<float> heights;
       TileCodes codes;
-      (void)quantise(conversion_.quantisation, limits, datum, heights, codes);
+      made[i].is_empty = true;
+      if (!source.cut(grid.tile_at(first + static_cast<std::int64_t>(i)), *part, heights, codes)) return;
       made[i] = encode_tile(grid.shape(), codes, kLevel);
     });
     for (std::size_t i = 0; i < made.size(); ++i) tiles_[first + static_cast<std::int64_t>(i)] = std::move(made[i]);

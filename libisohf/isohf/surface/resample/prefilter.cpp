@@ -284,6 +284,10 @@ Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition, Edges e
   return prefilter;
 }
 
+Prefilter Prefilter::smoothing(Edges edges) {
+  return {{20.0 / 64.0, 15.0 / 64.0, 6.0 / 64.0, 1.0 / 64.0}, 0, 1.0, edges};
+}
+
 void Prefilter::filter_rows(View2D<float> band, bool wraps) const {
   if (is_identity()) return;
   in_parallel(band.rows(), 4, [&](std::int64_t begin, std::int64_t end) {

@@ -38,6 +38,10 @@ class Prefilter {
 
   static constexpr double kMostGain = 100.0;
 
+  /// Instead of that a mean of the samples around, along each axis by the weights 1 6 15 20 15 6 1 / 64. Voids are as
+  /// above, and no place beyond a sample receives a coefficient.
+  [[nodiscard]] static Prefilter smoothing(Edges edges);
+
   /// True where samples are their own coefficients; the functions below then only copy.
   [[nodiscard]] bool is_identity() const { return taps_.size() == 1; }
   /// Samples on either side that one coefficient depends on: 0 for the identity, 20 for bspline3, 33 for bspline5.

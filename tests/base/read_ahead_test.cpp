@@ -1,0 +1,35 @@
+#include "isohf/base/memory/read_ahead.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "isohf/byte_source.h"
+#include "isohf/error.h"
+
+namespace isohf {
+namespace {
+
+TEST(ReadAhead, MakesNoRoomForWhatTheSourceCannotHold) {
+  std::vector<std::byte> bytes(1000);
+  bytes[400] = std::byte{7};
+  const auto source = memory_source(std::move(bytes));
+  ReadAhead ahead;
+  for (const std::uint64_t size : {std::uint64_t{991}, std::uint64_t{0xffffffff}, std::uint64_t{1} << 62U,
+                                   std::numeric_limits<std::uint64_t>::max()}) {
+    try {
+      (void)ahead.bytes(*source, 10, size);
+      ADD_FAILURE() << size;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kIo);
+      EXPECT_THAT(error.what(), testing::HasSubstr("ends at byte 1000"));
+    }
+  }
+  EXPECT_EQ(ahead.bytes(*source, 400, 600).front(), std::byte{7});
+}
+
+}  // namespace
+}  // namespace isohf
