@@ -35,4 +35,14 @@ ArchiveReader open_archive(const std::string& path) {
   }
 }
 
+ArchiveReader open_with_source(const std::string& path) {
+  ArchiveReader archive = open_archive(path);
+  try {
+    if (is_warped(archive.metadata())) understand_source(archive);
+  } catch (const Error&) {
+    // As above.
+  }
+  return archive;
+}
+
 }  // namespace isohf::cli

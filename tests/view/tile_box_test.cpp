@@ -18,27 +18,32 @@ TileGrid wide_grid() {
   return TileGrid::make(TileShape::make(12, 11, 3), 30, 20, 100.0, 100.0);
 }
 
-/// What the buffer behind a vertex attribute of a slot holds from `first` on; empty where the attribute has no buffer.
 template <typename Value>
-std::vector<Value> on_gpu(const TileSlot& slot, GLuint attribute, int first) {
-  slot.bind();
-  GLint enabled = 0;
-  GLint buffer = 0;
-  glGetVertexAttribiv(attribute, GL_VERTEX_ATTRIB_ARRAY_ENABLED, &enabled);
-  glGetVertexAttribiv(attribute, GL_VERTEX_ATTRIB_ARRAY_BUFFER_BINDING, &buffer);
-  glBindVertexArray(0);
-  if (enabled == 0) return {};
+std::vector<Value> on_gpu(GLint buffer, int first) {
   std::vector<Value> values(static_cast<std::size_t>(wide_grid().shape().stored_vertex_count()));
   glBindBuffer(GL_COPY_READ_BUFFER, static_cast<GLuint>(buffer));
   glGetBufferSubData(GL_COPY_READ_BUFFER, 2 * first, static_cast<GLsizeiptr>(2 * values.size()), values.data());
   return values;
 }
-/// A row and two vertices of nothing lie before the codes.
+/// Of the buffer texture on the unit where shaders fetch codes. A row and two vertices of nothing lie before them.
 std::vector<std::uint16_t> codes_on_gpu(const TileSlot& slot) {
-  return on_gpu<std::uint16_t>(slot, 1, wide_grid().shape().columns() + 2);
+  slot.bind();
+  GLint buffer = 0;
+  glActiveTexture(GL_TEXTURE2);
+  glGetTexLevelParameteriv(GL_TEXTURE_BUFFER, 0, GL_TEXTURE_BUFFER_DATA_STORE_BINDING, &buffer);
+  glActiveTexture(GL_TEXTURE0);
+  glBindVertexArray(0);
+  return on_gpu<std::uint16_t>(buffer, wide_grid().shape().columns() + 2);
 }
+/// Of the vertex attribute; empty where it has no buffer.
 std::vector<std::int16_t> shadow_on_gpu(const TileSlot& slot) {
-  return on_gpu<std::int16_t>(slot, 4, 0);
+  slot.bind();
+  GLint enabled = 0;
+  GLint buffer = 0;
+  glGetVertexAttribiv(1, GL_VERTEX_ATTRIB_ARRAY_ENABLED, &enabled);
+  glGetVertexAttribiv(1, GL_VERTEX_ATTRIB_ARRAY_BUFFER_BINDING, &buffer);
+  glBindVertexArray(0);
+  return enabled == 0 ? std::vector<std::int16_t>() : on_gpu<std::int16_t>(buffer, 0);
 }
 
 class TileBoxTest : public test::GlTest {

@@ -285,7 +285,7 @@ class Exporter {
 };
 
 int run(const ExportOptions& options) {
-  ArchiveReader archive = open_archive(options.raster.archive);
+  ArchiveReader archive = open_with_source(options.raster.archive);
   const ExportGrid grid = asked_grid(options, archive);
   for (const std::string& file : ExportTiles(options.raster.output, grid.cut, grid.samples.width).names()) {
     check_raster_output({options.raster.archive}, file, options.raster.overwrite);

@@ -312,7 +312,7 @@ int run(const RestoreOptions& options) {
   }
   check_raster_output(inputs, options.raster.output, options.raster.overwrite);
   WorkArena arena(options.work.threads);
-  ArchiveReader archive = open_archive(options.raster.archive);
+  ArchiveReader archive = open_with_source(options.raster.archive);
   const bool wants_source =
       options.like.empty() && !options.raster.size && !options.raster.spacing && !options.raster.method;
   bool is_lossless = wants_source && lossless_record(archive.metadata());

@@ -14,19 +14,17 @@ std::string header(bool rim) {
 // one place and no crack can open between them.
 //
 // Normals: paper Eqs. 10-11 with errata E5-E10, for the four kinds of fan of isohf/surface/normals.h. Differences of
-// codes are exact in integers, so both tiles of an edge also get the same normal, bit for bit. The neighbours are the
-// same buffer again, bound as overlapping attributes that begin a row earlier and later (v is the vertex):
+// codes are exact in integers, so both tiles of an edge also get the same normal, bit for bit. Codes are fetched by the
+// vertex's number v:
 //
 //   north   v-C-1  v-C  v-C+1  v-C+2       even row: NW = x, NE = y; on the West edge N = y, on the East edge N = x
 //   here      v-1   v    v+1               odd row:  NW = y, NE = z; on the West edge NW = x, N = y, NE = z,
 //   south   v+C-1  v+C  v+C+1  v+C+2                                 on the East edge NW = y, N = z, NE = w
 constexpr const char* kTerrainVertex = R"glsl(
 layout(location = 0) in ivec2 object_xz;
-layout(location = 1) in uvec3 here;
-layout(location = 2) in uvec4 north;
-layout(location = 3) in uvec4 south;
-layout(location = 4) in float shadow;
+layout(location = 1) in float shadow;
 
+uniform usamplerBuffer codes;   // of the tile, with a row and two vertices of nothing before and behind
 uniform ivec2 last_xz;          // 2(C-4), R-3: the East and South edges
 uniform ivec2 tile_lattice;     // the tile's North-West corner, lattice steps from the anchor
 uniform int stride;             // lattice steps of one of the tile's: of its plane
@@ -48,14 +46,21 @@ out gl_PerVertex {
 out float v_void;
 #endif
 
-vec3 vertex_normal() {
+int code(int v) { return int(texelFetch(codes, v).r); }
+
+vec3 vertex_normal(int v, int own) {
+  int columns = last_xz.x / 2 + 4;
   bool odd = (object_xz.y & 1) == 0;  // the grid row is z + 1
   bool west = object_xz.x == 0;
   bool east = object_xz.x == last_xz.x;
-  ivec4 n = ivec4(north);
-  ivec4 s = ivec4(south);
+  int north = v - columns;
+  int south = v + columns;
+  int before = code(v - 1);
+  int behind = code(v + 1);
+  ivec4 n = ivec4(odd && !west ? 0 : code(north - 1), code(north), odd ? code(north + 1) : 0, odd && east ? code(north + 2) : 0);
+  ivec4 s = ivec4(odd && !west ? 0 : code(south - 1), code(south), odd ? code(south + 1) : 0, odd && east ? code(south + 2) : 0);
   ivec4 fall = n - s;
-  int across = 2 * (int(here.x) - int(here.z));
+  int across = 2 * (before - behind);
   int rise_x;
   int rise_z;
   int steps_x = 12;
@@ -77,15 +82,15 @@ vec3 vertex_normal() {
     steps_x = edge ? 4 : steps_z;
   }
 #ifdef RIM
-  uint worst = max(max(here.x, here.y), here.z);
-  uvec4 either = max(north, south);
+  int worst = max(max(before, own), behind);
+  ivec4 either = max(n, s);
   if (odd) {
     worst = max(worst, max(either.y, either.z));
-    worst = max(worst, max(west ? either.x : 0u, east ? either.w : 0u));
+    worst = max(worst, max(west ? either.x : 0, east ? either.w : 0));
   } else {
-    worst = max(worst, max(west ? 0u : either.x, east ? 0u : either.y));
+    worst = max(worst, max(west ? 0 : either.x, east ? 0 : either.y));
   }
-  if (worst == 65535u) return vec3(0.0, 1.0, 0.0);
+  if (worst == 65535) return vec3(0.0, 1.0, 0.0);
 #endif
   return normalize(vec3(float(rise_x) * code_slope / (float(steps_x * stride) * sigma.x), 1.0,
                         float(rise_z) * code_slope / (float(steps_z * stride) * sigma.y)));
@@ -94,13 +99,15 @@ vec3 vertex_normal() {
 void main() {
   // Tiles of coarse planes end with the heightfield.
   ivec2 lattice = clamp(tile_lattice + object_xz * stride, world.xy, world.zw);
-  float height = float(here.y) * code_height;
+  int v = gl_VertexID + last_xz.x / 2 + 6;
+  int own = code(v);
+  float height = float(own) * code_height;
   vec3 eye = anchor + vec3(float(lattice.x) * sigma.x, height, float(lattice.y) * sigma.y);
-  v_facing = vec4(vertex_normal(), length(eye));
-  v_place = vec4(vec2(lattice - tile_lattice) / float(stride), float(here.y), shadow);
+  v_facing = vec4(vertex_normal(v, own), length(eye));
+  v_place = vec4(vec2(lattice - tile_lattice) / float(stride), float(own), shadow);
   gl_Position = clip_from_eye * vec4(eye, 1.0);
 #ifdef RIM
-  v_void = here.y == 65535u ? 1.0 : 0.0;
+  v_void = own == 65535 ? 1.0 : 0.0;
   gl_ClipDistance[0] = eye.x - covered.x;
   gl_ClipDistance[1] = eye.z - covered.y;
   gl_ClipDistance[2] = covered.z - eye.x;
@@ -269,6 +276,7 @@ void TerrainProgram::begin(const TileGrid& grid, const TerrainFrame& frame) cons
   };
   glUniform1i(uniform("tile_texture"), 0);
   glUniform1i(uniform("palette"), 1);
+  glUniform1i(uniform("codes"), 2);
   glUniform2i(uniform("last_xz"), 2 * grid.shape().cell_columns(), grid.shape().cell_rows());
   set_vec2("sigma", grid.sigma_x(), grid.sigma_z());
   set_vec2("object_size", 2.0 * grid.shape().cell_columns(), grid.shape().cell_rows());

@@ -1,6 +1,9 @@
 #include "gl/tile_buffers.h"
 
+#include <fmt/format.h>
+
 #include "isohf/base/assert.h"
+#include "isohf/error.h"
 #include "isohf/lattice/planes.h"
 #include "isohf/lattice/stitch.h"
 #include "isohf/lattice/strip.h"
@@ -26,7 +29,8 @@ void upload_static(GLenum target, const std::vector<T>& values) {
   glBufferData(target, static_cast<GLsizeiptr>(values.size() * sizeof(T)), values.data(), GL_STATIC_DRAW);
 }
 
-constexpr GLuint kShadowAttribute = 4;
+constexpr GLuint kShadowAttribute = 1;
+constexpr GLenum kCodesUnit = GL_TEXTURE2;
 
 const void* offset_pointer(std::size_t bytes) {
   return reinterpret_cast<const void*>(bytes);
@@ -121,29 +125,43 @@ std::vector<std::uint32_t> SharedGeometry::read_stitch(int level) const {
 TileSlot::TileSlot(const SharedGeometry& shared)
     : vertices_(static_cast<std::size_t>(shared.shape().stored_vertex_count())),
       rim_(static_cast<std::size_t>(shared.shape().columns()) + 2) {
-  constexpr GLsizei kStep = sizeof(std::uint16_t);
+  const std::vector<std::uint16_t> nothing(vertices_ + 2 * rim_, 0);
+  GLint most = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &most);
+  if (nothing.size() > static_cast<std::size_t>(most)) {
+    throw Error(ErrorCode::kUnsupported,
+                fmt::format("tiles of {} vertices take a buffer texture of {} texels, the driver has {} at most",
+                            vertices_, nothing.size(), most));
+  }
   glBindVertexArray(array_.get());
   glBindBuffer(GL_ARRAY_BUFFER, shared.xz());
   glVertexAttribIPointer(0, 2, GL_SHORT, 0, nullptr);
-  glBindBuffer(GL_ARRAY_BUFFER, codes_.get());
-  const std::vector<std::uint16_t> nothing(vertices_ + 2 * rim_, 0);
-  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(nothing.size() * kStep), nothing.data(), GL_DYNAMIC_DRAW);
-  const std::size_t row = rim_ - 2;
-  glVertexAttribIPointer(1, 3, GL_UNSIGNED_SHORT, kStep, offset_pointer((rim_ - 1) * kStep));
-  glVertexAttribIPointer(2, 4, GL_UNSIGNED_SHORT, kStep, offset_pointer((rim_ - row - 1) * kStep));
-  glVertexAttribIPointer(3, 4, GL_UNSIGNED_SHORT, kStep, offset_pointer((rim_ + row - 1) * kStep));
-  for (GLuint attribute = 0; attribute < 4; ++attribute) glEnableVertexAttribArray(attribute);
+  glEnableVertexAttribArray(0);
+  glBindBuffer(GL_TEXTURE_BUFFER, codes_.get());
+  glBufferData(GL_TEXTURE_BUFFER, static_cast<GLsizeiptr>(nothing.size() * sizeof(std::uint16_t)), nothing.data(),
+               GL_DYNAMIC_DRAW);
+  glActiveTexture(kCodesUnit);
+  glBindTexture(GL_TEXTURE_BUFFER, fetched_.get());
+  glTexBuffer(GL_TEXTURE_BUFFER, GL_R16UI, codes_.get());
+  glActiveTexture(GL_TEXTURE0);
   glVertexAttrib1f(kShadowAttribute, 0.0F);
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, shared.indices());
   glBindVertexArray(0);
   check_gl("making a tile's elevation buffer");
 }
 
+void TileSlot::bind() const {
+  glBindVertexArray(array_.get());
+  glActiveTexture(kCodesUnit);
+  glBindTexture(GL_TEXTURE_BUFFER, fetched_.get());
+  glActiveTexture(GL_TEXTURE0);
+}
+
 void TileSlot::upload(std::span<const std::uint16_t> codes) {
   ISOHF_ASSERT(codes.size() == vertices_);
   shadow_gain_ = 0.0F;  // what it has is of another tile
-  glBindBuffer(GL_ARRAY_BUFFER, codes_.get());
-  glBufferSubData(GL_ARRAY_BUFFER, static_cast<GLintptr>(rim_ * sizeof(std::uint16_t)),
+  glBindBuffer(GL_TEXTURE_BUFFER, codes_.get());
+  glBufferSubData(GL_TEXTURE_BUFFER, static_cast<GLintptr>(rim_ * sizeof(std::uint16_t)),
                   static_cast<GLsizeiptr>(codes.size_bytes()), codes.data());
 }
 

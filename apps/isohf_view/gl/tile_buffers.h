@@ -56,10 +56,9 @@ class SharedGeometry {
   std::vector<std::size_t> side_offsets_bytes_;
 };
 
-/// One tile on the GPU: two bytes a vertex. The one buffer is bound as three overlapping attributes, so that the vertex
-/// shader finds the neighbours that a normal needs: v-1..v+1, v-C-1..v-C+2 and v+C-1..v+C+2. A row and two vertices of
-/// nothing lie before and behind the codes. Shadows take two more bytes a vertex. A slot is reused for tile
-/// after tile.
+/// One tile on the GPU: two bytes a vertex. The vertex shader fetches them from a buffer texture, its own and those of the
+/// neighbours that a normal needs: v-1..v+1, v-C-1..v-C+2 and v+C-1..v+C+2. A row and two vertices of nothing lie before
+/// and behind the codes. Shadows take two more bytes a vertex, as an attribute. A slot is reused for tile after tile.
 class TileSlot {
  public:
   explicit TileSlot(const SharedGeometry& shared);
@@ -72,8 +71,8 @@ class TileSlot {
   /// 0 without a shadow.
   [[nodiscard]] float shadow_gain() const { return shadow_gain_; }
 
-  /// Binds the vertex array.
-  void bind() const { glBindVertexArray(array_.get()); }
+  /// Binds the vertex array and the codes; texture unit 0 is active afterwards.
+  void bind() const;
 
   /// What a tile takes, and what drivers keep of it besides: Mesa 3 KB for its vertex array and buffers.
   [[nodiscard]] static std::uint64_t bytes(const TileShape& shape, bool shadow = false) {
@@ -87,6 +86,7 @@ class TileSlot {
   std::size_t vertices_;
   std::size_t rim_;  ///< unused vertices before and behind the codes
   Buffer codes_;
+  Texture fetched_;  ///< of codes_
   std::optional<Buffer> shadow_;
   float shadow_gain_ = 0.0F;
   VertexArray array_;

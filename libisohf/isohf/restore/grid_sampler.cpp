@@ -19,15 +19,17 @@ namespace isohf {
 namespace {
 
 constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
-/// Samples this far beyond the surface's end, in their spacing, count as on it: ends are computed by products.
-constexpr double kEndTolerance = 1e-6;
+/// Samples this far beyond the surface's end, in their spacing, count as on it: ends are computed by products, and
+/// georeferences are rounded.
+constexpr double kRounding = 1e-6;
+constexpr double kRoundedPlace = 0.01;
 
-std::vector<double> columns_of(const SampleGrid& samples, const std::optional<Turn>& turn) {
+std::vector<double> columns_of(const SampleGrid& samples, const std::optional<Turn>& turn, double tolerance) {
   std::vector<double> columns;
   columns.reserve(static_cast<std::size_t>(samples.width));
   for (std::int64_t c = 0; c < samples.width; ++c) {
     const double x = samples.first_x + static_cast<double>(c) * samples.spacing_x;
-    columns.push_back(turn ? turn->onto_ground(x, kEndTolerance * samples.spacing_x) : x);
+    columns.push_back(turn ? turn->onto_ground(x, tolerance * samples.spacing_x) : x);
   }
   return columns;
 }
@@ -37,8 +39,8 @@ constexpr std::int64_t kBlock = 2048;
 /// Lattice rows that are straightened at once where memory is short: each takes a few copies of itself.
 constexpr std::int64_t kLinesInScratch = 2;
 
-bool is_inside(double place, double spacing, double end) {
-  return place >= -kEndTolerance * spacing && place <= end + kEndTolerance * spacing;
+bool is_inside(double place, double tolerance, double end) {
+  return place >= -tolerance && place <= end + tolerance;
 }
 
 }  // namespace
@@ -85,17 +87,18 @@ GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation&
       samples_(require_samples_near(samples, world.value_or(grid))),
       method_(method),
       end_z_(world.value_or(grid).world_height()),
+      tolerance_(world ? kRoundedPlace : kRounding),
       snaps_(snaps),
       beyond_(snaps ? Beyond::kSloped : Beyond::kMirrored),
-      spline_(grid, method == RestoreMethod::kHex ? columns_of(samples, turn) : std::vector<double>{}, wraps_x, beyond_,
-              scratch),
+      spline_(grid, method == RestoreMethod::kHex ? columns_of(samples, turn, tolerance_) : std::vector<double>{},
+              wraps_x, beyond_, scratch),
       in_scratch_(scratch.has_value()),
       heights_(static_cast<std::size_t>(samples.width), scratch),
       near_void_(static_cast<std::size_t>(samples.width), scratch) {
-  for (const double x : columns_of(samples, turn)) {
+  for (const double x : columns_of(samples, turn, tolerance_)) {
     const TilePoint at = grid_.locate({x, 0.0});
     columns_.push_back(
-        {is_inside(x, samples.spacing_x, world.value_or(grid).world_width()), at.tile.column, at.point.x});
+        {is_inside(x, tolerance_ * samples.spacing_x, world.value_or(grid).world_width()), at.tile.column, at.point.x});
   }
   // Splines run along whole rows, triangles need what is under them.
   const bool needs_all = method_ == RestoreMethod::kHex;
@@ -214,7 +217,7 @@ void GridSampler::read_on_triangles(const TilePoint& at, const Block& block, std
 
 void GridSampler::read_row(std::int64_t row, Block& block, std::span<double> out) const {
   const double z = world_z(row);
-  if (!is_inside(z, samples_.spacing_z, end_z_)) {
+  if (!is_inside(z, tolerance_ * samples_.spacing_z, end_z_)) {
     std::fill(out.begin(), out.end(), kVoid);
     return;
   }

@@ -28,7 +28,8 @@ class GridSampler {
   /// wraps_x  the grid's East edge is its West edge
   /// snaps    as in PointSampler; without it rows and columns are mirrored at their ends besides, as predictions of old
   ///          archives have it
-  /// world    where the surface ends; nullopt: with the grid, beyond which a coarse plane's may reach
+  /// world    where the surface ends, to a hundredth of a sample, as georeferences are rounded; nullopt: with the grid,
+  ///          beyond which a coarse plane's may reach
   /// scratch  keeps tile rows and lattice rows where memory has no room for them
   /// turn     columns that miss the ground are looked for some turns away
   GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
@@ -73,7 +74,8 @@ class GridSampler {
   Quantisation quantisation_;
   SampleGrid samples_;
   RestoreMethod method_;
-  double end_z_;  ///< of the surface, world units
+  double end_z_;      ///< of the surface, world units
+  double tolerance_;  ///< beyond it, samples
   bool snaps_;
   Beyond beyond_;
   SplineRows spline_;

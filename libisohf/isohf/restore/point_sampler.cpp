@@ -211,8 +211,8 @@ void PointSampler::visit(std::size_t points, const TileOf& tile_of, const Sample
 }
 
 std::int64_t PointSampler::tile_under(WorldPoint point) const {
-  // A place on the outline that went through degrees or a map comes back off it by roundings.
-  const double slack = snaps_ ? 1e-11 * std::max(grid_.world_width(), grid_.world_height()) : 0.0;
+  // A place on the outline that went through degrees or a map, or was rounded, comes back off it.
+  const double slack = snaps_ ? 0.001 * std::min(2.0 * grid_.sigma_x(), grid_.sigma_z()) : 0.0;
   const bool is_inside = std::abs(std::clamp(point.x, 0.0, grid_.world_width()) - point.x) <= slack &&
                          std::abs(std::clamp(point.z, 0.0, grid_.world_height()) - point.z) <= slack;
   return is_inside ? grid_.flat_index(grid_.locate(point).tile) : -1;

@@ -14,6 +14,7 @@
 #include "isohf/base/handed_in.h"
 #include "isohf/base/memory/memory_budget.h"
 #include "isohf/error.h"
+#include "isohf/restore/archive_geometry.h"
 #include "isohf/restore/grid_sampler.h"
 #include "isohf/restore/point_sampler.h"
 #include "isohf/restore/point_shadow.h"
@@ -92,6 +93,66 @@ SampleGrid places_of(const SampleGrid& grid, const GridSize& parts) {
 std::string grid_name(const SampleGrid& grid) {
   return fmt::format("a grid of {} x {} samples", grid.width, grid.height);
 }
+
+/// Where a projected source ends. Its tiles go on some way beyond it, so that no triangle on its edge is missing.
+class SourceOutline {
+ public:
+  /// nullopt where the source ends with the tiles, or its own map is not understood.
+  [[nodiscard]] static std::optional<SourceOutline> of(const Metadata& metadata) {
+    const auto& map = metadata.projection;
+    const bool is_known = is_warped(metadata) && (metadata.source.crs_unit == "degree" || metadata.source.map) &&
+                          (map->spec.kind != ProjectionKind::kSystem || map->spec.map);
+    if (!is_known) return std::nullopt;
+    return SourceOutline(archive_geometry(metadata));
+  }
+
+  /// Makes elevations void whose places lie outside. place_of(i): of the i-th; neighbours lie beside each other.
+  template <typename PlaceOf>
+  void hold(std::span<double> elevations, const PlaceOf& place_of) const {
+    constexpr std::size_t kRun = 64;
+    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, elevations.size(), kRun),
+                              [&](const auto& some) {
+                                for (std::size_t first = some.begin(); first < some.end(); first += kRun) {
+                                  const std::size_t end = std::min(first + kRun, some.end());
+                                  // Between places that lie farther inside than from each other all lies inside.
+                                  const SourcePosition west = warp_.source_from_world(place_of(first));
+                                  const SourcePosition middle = warp_.source_from_world(place_of((first + end) / 2));
+                                  const SourcePosition east = warp_.source_from_world(place_of(end - 1));
+                                  const auto apart = [](SourcePosition a, SourcePosition b) {
+                                    return std::abs(a.u - b.u) + std::abs(a.v - b.v);
+                                  };
+                                  const double far = apart(west, middle) + apart(middle, east);
+                                  if (inside(west) > far && inside(middle) > far && inside(east) > far) continue;
+                                  for (std::size_t i = first; i < end; ++i) {
+                                    if (std::isnan(elevations[i])) continue;
+                                    if (!(inside(warp_.source_from_world(place_of(i))) >= -kRounded)) {
+                                      elevations[i] = std::numeric_limits<double>::quiet_NaN();
+                                    }
+                                  }
+                                }
+                              });
+  }
+
+ private:
+  static constexpr double kRounded = 0.01;  ///< samples, as georeferences are rounded
+
+  explicit SourceOutline(const SourceGeometry& geometry)
+      : warp_(*geometry.warp),
+        beyond_(geometry.registration == Registration::kArea ? 0.5 : 0.0),
+        width_(geometry.wraps_x ? HUGE_VAL : static_cast<double>(geometry.width) - 1.0),
+        height_(static_cast<double>(geometry.height) - 1.0) {}
+
+  /// Samples from the nearest edge, below 0 outside; NaN where the map shows no ground.
+  [[nodiscard]] double inside(SourcePosition at) const {
+    const double across = std::isinf(width_) ? HUGE_VAL : std::min(at.u, width_ - at.u);
+    return std::min(across, std::min(at.v, height_ - at.v)) + beyond_ + (at.u - at.u);
+  }
+
+  ExactWarp warp_;
+  double beyond_;  ///< the outermost samples
+  double width_;   ///< first to last sample; infinite all the way round
+  double height_;
+};
 
 void require_as_many(std::size_t samples, std::size_t points) {
   if (samples == points) return;
@@ -201,6 +262,7 @@ struct RowReader::State {
       return;
     }
     rows_at_once = std::max<std::int64_t>(kSamplesAtOnce / grid.width, 1);
+    outline = SourceOutline::of(metadata);
     if (!grid.goes_by_places()) {
       const int plane = method == RestoreMethod::kPlane ? plane_for(metadata, grid) : 0;
       const TileGrid tiles = metadata.plane_grid(plane);
@@ -243,6 +305,17 @@ struct RowReader::State {
       }
     });
     points->sample(at, elevations);
+    if (outline) outline->hold(elevations, [&](std::size_t i) { return at[i]; });
+  }
+
+  void read_in_world(std::int64_t first, std::int64_t count, std::span<double> elevations) {
+    rows->read(first, count, elevations);
+    if (!outline) return;
+    outline->hold(elevations, [&](std::size_t i) {
+      const auto sample = static_cast<std::int64_t>(i);
+      return WorldPoint{grid.first_x + static_cast<double>(sample % grid.width) * grid.spacing_x,
+                        grid.first_z + static_cast<double>(first + sample / grid.width) * grid.spacing_z};
+    });
   }
 
   /// Sums go from West to East in rows from North to South, however many rows are read at once.
@@ -284,7 +357,8 @@ struct RowReader::State {
   std::int64_t next_row = 0;  ///< the first that may still be read
   GridSize parts = {1, 1};
   std::unique_ptr<RowReader> places;  ///< whose means are the samples
-  std::optional<GridSampler> rows;    ///< of a grid in world units
+  std::optional<SourceOutline> outline;
+  std::optional<GridSampler> rows;  ///< of a grid in world units
   std::optional<WorldGeoreference> georeference;
   std::optional<PointSampler> points;
 };
@@ -309,7 +383,7 @@ void RowReader::read(std::int64_t first, std::int64_t rows, std::span<double> el
     if (state_->places) {
       state_->average(first, rows, elevations);
     } else if (state_->rows) {
-      state_->rows->read(first, rows, elevations);
+      state_->read_in_world(first, rows, elevations);
     } else {
       state_->read_by_places(first, rows, elevations);
     }

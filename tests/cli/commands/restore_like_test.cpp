@@ -161,10 +161,18 @@ TEST_F(RestoreLike, GivesWhatSampleFindsAtFinerCoarserAndShiftedGrids) {
     for (const std::string name : {"finer.flt", "coarser.flt", "turned.flt"}) {
       SCOPED_TRACE(kind + " " + name);
       const Raster found = like(name);
-      const std::vector<float> expected = sampled(read_raster(folder / name).info);
+      const SourceInfo info = read_raster(folder / name).info;
+      std::vector<float> expected = sampled(info);
       ASSERT_EQ(found.heights.size(), expected.size());
       std::size_t voids = 0;
       for (std::size_t i = 0; i < expected.size(); ++i) {
+        // Tiles go on beyond the input, and are sampled as they are drawn; rasters end where it does.
+        const auto sample = static_cast<std::int64_t>(i);
+        const double longitude = std::remainder(
+            info.georeference.origin_x + static_cast<double>(sample % info.width) * info.georeference.spacing_x, 360.0);
+        const double latitude =
+            info.georeference.origin_y - static_cast<double>(sample / info.width) * info.georeference.spacing_y;
+        if (longitude < 2.0 || longitude > 14.0 || latitude < 42.0 || latitude > 50.0) expected[i] = std::nanf("");
         ASSERT_EQ(std::isnan(found.heights[i]), std::isnan(expected[i])) << i;
         voids += std::isnan(expected[i]) ? 1U : 0U;
         // Nine digits are printed, and both are rounded to floats, which lie 0.00012 apart there.
