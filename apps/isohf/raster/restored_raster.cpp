@@ -115,6 +115,8 @@ SampleMapping spread_over(SampleType type, RowReader rows, const Job& job, bool&
         }
       },
       job);
+  // Filters leave some rounding of level ground, which spread over all numbers would be noise.
+  if (high - low <= 1e-7 * std::max(std::abs(low), std::abs(high))) high = low;
   return low <= high ? spread(type, {low, high}, has_voids) : SampleMapping{type, 1.0, 0.0};
 }
 

@@ -133,8 +133,12 @@ void for_each_group(const ReadTiles& read_tiles, TileIndex first, std::int64_t t
 }
 
 PointSampler::PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles,
-                           std::uint64_t memory_bytes, bool snaps)
-    : grid_(grid), quantisation_(quantisation), read_tiles_(std::move(read_tiles)), snaps_(snaps) {
+                           std::uint64_t memory_bytes, bool snaps, const std::optional<TileRange>& here)
+    : grid_(grid),
+      quantisation_(quantisation),
+      read_tiles_(std::move(read_tiles)),
+      snaps_(snaps),
+      here_(here.value_or(TileRange{{0, 0}, {grid.tile_columns(), grid.tile_rows()}})) {
   const std::uint64_t bytes = quantisation.type == CodeType::kF32 ? 4 : 2;
   const std::uint64_t tile_bytes = static_cast<std::uint64_t>(grid.shape().stored_vertex_count()) * bytes;
   const auto threads = static_cast<std::uint64_t>(oneapi::tbb::this_task_arena::max_concurrency());
@@ -215,7 +219,7 @@ std::int64_t PointSampler::tile_under(WorldPoint point) const {
   const double slack = snaps_ ? 0.001 * std::min(2.0 * grid_.sigma_x(), grid_.sigma_z()) : 0.0;
   const bool is_inside = std::abs(std::clamp(point.x, 0.0, grid_.world_width()) - point.x) <= slack &&
                          std::abs(std::clamp(point.z, 0.0, grid_.world_height()) - point.z) <= slack;
-  return is_inside ? grid_.flat_index(grid_.locate(point).tile) : -1;
+  return is_inside ? grid_.flat_index(locate(point).tile) : -1;
 }
 
 void PointSampler::sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples) {
@@ -228,7 +232,7 @@ void PointSampler::sample(std::span<const WorldPoint> points, std::span<SurfaceS
     TileSurface surface(grid_, quantisation_, codes, scratches.local());
     for (const Run& run : runs) {
       for (std::size_t i = run.first; i < run.end; ++i) {
-        const TilePoint at = grid_.locate(points[i]);
+        const TilePoint at = locate(points[i]);
         samples[i].tile = at.tile;
         surface.sample(at.point, samples[i]);
       }
@@ -245,7 +249,7 @@ void PointSampler::sample(std::span<const WorldPoint> points, std::span<double> 
     const TileSurface surface(grid_, quantisation_, codes, no_scratch);
     for (const Run& run : runs) {
       for (std::size_t i = run.first; i < run.end; ++i) {
-        const Barycentric where = barycentric(grid_.shape(), grid_.locate(points[i]).point);
+        const Barycentric where = barycentric(grid_.shape(), locate(points[i]).point);
         elevations[i] = surface.elevation(snaps_ ? snapped(where) : where);
       }
     }
@@ -259,13 +263,13 @@ void PointSampler::sample(std::span<const FixedPlace> places, const FixedHeights
   const TileShape& shape = grid_.shape();
   FixedTilePlace under{};
   const auto tile_of = [&](std::size_t i) {
-    return locate(grid_, places[i], under) ? grid_.flat_index(under.tile) : -1;
+    return isohf::locate(grid_, places[i], under) ? grid_.flat_index(under.tile) : -1;
   };
   visit(places.size(), tile_of, [&](const TileCodes& codes, std::span<const Run> runs) {
     FixedTilePlace at{};
     for (const Run& run : runs) {
       for (std::size_t i = run.first; i < run.end; ++i) {
-        (void)locate(grid_, places[i], at);
+        (void)isohf::locate(grid_, places[i], at);
         elevations[i] = heights.elevation(fixed_height(fixed_triangle(shape, at.place), [&](GridVertex vertex) {
           return heights.at(codes, static_cast<std::size_t>(vertex.row * shape.columns() + vertex.column));
         }));

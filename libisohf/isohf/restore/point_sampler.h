@@ -4,12 +4,14 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <unordered_map>
 #include <vector>
 
 #include "isohf/lattice/barycentric.h"
 #include "isohf/restore/predict/fixed_point.h"
+#include "isohf/restore/sample_grids.h"
 #include "isohf/surface.h"
 
 namespace isohf {
@@ -36,8 +38,9 @@ class PointSampler {
   /// thread at least.
   /// snaps  places on a side or vertex of their triangle need nothing off it (lattice/barycentric.h); not so in
   ///        predictions of old archives
+  /// here   the tiles that there are; nullopt: all
   PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles, std::uint64_t memory_bytes,
-               bool snaps = true);
+               bool snaps = true, const std::optional<TileRange>& here = {});
 
   void sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples);
   void sample(std::span<const WorldPoint> points, std::span<double> elevations);
@@ -55,6 +58,7 @@ class PointSampler {
   };
 
   [[nodiscard]] std::int64_t tile_under(WorldPoint point) const;
+  [[nodiscard]] TilePoint locate(WorldPoint point) const { return locate_here(grid_, here_, point); }
   template <typename TileOf, typename Sample>
   void visit(std::size_t points, const TileOf& tile_of, const Sample& sample);
   [[nodiscard]] Codes kept(std::int64_t tile);
@@ -64,6 +68,7 @@ class PointSampler {
   Quantisation quantisation_;
   ReadTiles read_tiles_;
   bool snaps_;
+  TileRange here_;
   std::size_t capacity_;        ///< tiles to keep
   std::size_t tiles_together_;  ///< decoded at once by one thread
   std::mutex mutex_;            ///< of what follows

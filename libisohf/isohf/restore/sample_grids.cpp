@@ -396,6 +396,20 @@ WorldBounds ground_here(const Metadata& metadata) {
   return part.x0 < part.x1 && part.z0 < part.z1 ? part : all;
 }
 
+TilePoint locate_here(const TileGrid& grid, const TileRange& here, WorldPoint point) {
+  constexpr double kOnTheEdge = 0.002;  // half steps
+  TilePoint at = grid.locate(point);
+  if (at.tile.column == here.end.column && at.point.x <= kOnTheEdge) {
+    at.tile.column -= 1;
+    at.point.x = 2.0 * grid.shape().cell_columns();
+  }
+  if (at.tile.row == here.end.row && at.point.z <= kOnTheEdge) {
+    at.tile.row -= 1;
+    at.point.z = grid.shape().cell_rows();
+  }
+  return at;
+}
+
 namespace {
 
 SampleGrid natural_grid_of_all(const Metadata& metadata) {

@@ -7,6 +7,7 @@
 
 #include "isohf/projection/reference_map.h"
 #include "isohf/surface.h"
+#include "isohf/tile_range.h"
 
 namespace isohf {
 
@@ -15,6 +16,10 @@ namespace isohf {
 
 /// The ground that an archive has tiles of: all of it, or of a part that of its tiles.
 [[nodiscard]] WorldBounds ground_here(const Metadata& metadata);
+
+/// The tile under a point. What lies on an edge with tiles that an archive's part has not, to a thousandth of a step, is
+/// looked up in the part's own. here  as tiles_here()
+[[nodiscard]] TilePoint locate_here(const TileGrid& grid, const TileRange& here, WorldPoint point);
 
 /// Once round the body, where columns of an archive's world are longitudes.
 struct Turn {

@@ -57,6 +57,49 @@ class ExportCommand : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
+/// Tiles store the vertices on their edges, also those whose neighbours are not in the part.
+TEST_F(ExportCommand, APartHasElevationsOnAllOfItsEdges) {
+  ASSERT_EQ(run_isohf({"convert", kCoast, folder_ / "posts.isohf", "--registration", "point", "-q"}).exit_code, 0);
+  ASSERT_EQ(
+      run_isohf({"extract", folder_ / "posts.isohf", "-o", folder_ / "part.isohf", "--tiles", "0:2,0:1"}).exit_code, 0);
+  const json info = json::parse(run_isohf({"info", folder_ / "part.isohf", "--json"}).out).at("metadata");
+  const double east = 2.0 * info.at("extent").at("x").get<double>();
+  const double south = info.at("extent").at("z").get<double>();
+  for (const std::string method : {"hex", "barycentric", "average"}) {
+    const json said =
+        exported({folder_ / "part.tif", "--size", "129x65", "--method", method, "--overwrite"}, "part.isohf");
+    EXPECT_NEAR(said.at("first_sample").at("x").get<double>() + 128.0 * said.at("spacing").at("x").get<double>(), east,
+                1e-6);
+    EXPECT_EQ(said.at("voids"), 0) << method;
+  }
+  const auto sampled = [&](const std::string& archive) {
+    return run_isohf({"sample", folder_ / archive, "--at", std::to_string(east), "100", "--at", "100",
+                      std::to_string(south), "--at", std::to_string(east), std::to_string(south)})
+        .out;
+  };
+  const std::string found = sampled("part.isohf");
+  EXPECT_EQ(found.find("void"), std::string::npos) << found;
+  EXPECT_EQ(std::count(found.begin(), found.end(), '\n'), 3);
+}
+
+/// What filters leave of level ground is not spread over all numbers.
+TEST_F(ExportCommand, LevelGroundIsOneNumber) {
+  {
+    std::ofstream grid(folder_ / "level.asc");
+    grid << "ncols 60\nnrows 50\nxllcorner 0\nyllcorner 0\ncellsize 1\n";
+    for (int i = 0; i < 3000; ++i) grid << (i % 60 == 59 ? "100.1\n" : "100.1 ");
+  }
+  ASSERT_EQ(run_isohf({"convert", folder_ / "level.asc", folder_ / "level.isohf", "-q"}).exit_code, 0);
+  for (const std::string name : {"level.png", "level.r16"}) {
+    const json said = exported({folder_ / name}, "level.isohf");
+    EXPECT_EQ(said.at("z_scale"), 1.0);
+    const Raster codes = read_codes(folder_ / name);
+    EXPECT_EQ(*std::max_element(codes.elevations.begin(), codes.elevations.end()),
+              *std::min_element(codes.elevations.begin(), codes.elevations.end()));
+    EXPECT_NEAR(said.at("z_offset").get<double>() + codes.elevations.front(), 100.1, 1e-4);
+  }
+}
+
 TEST_F(ExportCommand, WritesTheSamePlaceAndElevationsInEveryFormat) {
   const json first = exported({folder_ / "a.tif"});
   EXPECT_EQ(first.at("width"), 512);
