@@ -15,7 +15,7 @@ namespace isohf {
 namespace {
 
 /// A method as keys and WKT 1 name it: what its origin is called there, and which parameters it has besides: 1 and 2 are
-/// standard parallels, k a scale, a the azimuth and the angle of the grid.
+/// standard parallels, k a scale, h a height, a the azimuth and the angle of the grid.
 struct Method {
   int code;
   std::string_view name;
@@ -30,7 +30,7 @@ constexpr const char* kMiddleLatitude = "latitude_of_center";
 constexpr const char* kMiddleLongitude = "longitude_of_center";
 
 // Codes: GeoTIFF 1.0, section 6.3.3.3; names: OGC 01-009 and GDAL.
-constexpr std::array<Method, 27> kMethods = {{
+constexpr std::array<Method, 28> kMethods = {{
     {1, "Transverse_Mercator", kOriginLatitude, kMeridian, "k"},
     {3, "Hotine_Oblique_Mercator_Azimuth_Center", kMiddleLatitude, kMiddleLongitude, "ka"},
     {9812, "Hotine_Oblique_Mercator", kMiddleLatitude, kMiddleLongitude, "ka"},
@@ -58,12 +58,23 @@ constexpr std::array<Method, 27> kMethods = {{
     {25, "VanDerGrinten", nullptr, kMeridian, ""},
     {26, "New_Zealand_Map_Grid", kOriginLatitude, kMeridian, ""},
     {28, "Cylindrical_Equal_Area", nullptr, kMeridian, "1"},
+    {0, "Vertical_Near_Side_Perspective", kMiddleLatitude, kMiddleLongitude, "h"},
 }};
 
 /// Quotes end names.
 std::string quoted(std::string name) {
   std::replace(name.begin(), name.end(), '"', '\'');
   return '"' + name + '"';
+}
+
+/// A cylinder about another axis, which WKT has no word for, as PROJ spells it: its pole's latitude is counted on beyond
+/// the body's pole there, and turned the other way.
+std::string oblique_wkt(const std::string& name, const std::string& geographic, const PlanetaryMap& map) {
+  return fmt::format(
+      "PROJCS[{},{},PROJECTION[\"custom_proj4\"],UNIT[\"metre\",1],AXIS[\"Easting\",EAST],AXIS[\"Northing\",NORTH],"
+      "EXTENSION[\"PROJ4\",\"+proj=ob_tran +o_proj=eqc +o_lon_p={} +o_lat_p={} +lon_0={} +R={}\"]]",
+      quoted(name), geographic, -map.pole_rotation, 180.0 - map.pole.latitude, map.pole.longitude,
+      map.equatorial_radius_m);
 }
 
 }  // namespace
@@ -93,6 +104,7 @@ std::string map_wkt(const std::string& name, const std::string& geographic, std:
     if (parameter == '1') add("standard_parallel_1", parameters.parallel_1);
     if (parameter == '2') add("standard_parallel_2", parameters.parallel_2);
     if (parameter == 'k') add("scale_factor", parameters.scale);
+    if (parameter == 'h') add("Height", parameters.height);
     if (parameter != 'a') continue;
     add("azimuth", parameters.azimuth);
     add("rectified_grid_angle", parameters.grid_angle);
@@ -114,7 +126,7 @@ std::string geographic_wkt(const std::string& name, const std::string& datum, co
                      is_degree ? 0.0174532925199433 : degrees_per_unit * std::numbers::pi / 180.0);
 }
 
-std::string planetary_wkt(const PlanetaryMap& map) {
+std::string planetary_wkt(const PlanetaryMap& map, std::vector<Warning>& warnings) {
   std::string kind;
   for (const char c : upper_case(map.projection)) {
     if (std::isalpha(static_cast<unsigned char>(c)) != 0) kind += c;
@@ -123,7 +135,8 @@ std::string planetary_wkt(const PlanetaryMap& map) {
     std::string_view kind;
     std::string_view method;
   };
-  static constexpr std::array<Known, 21> kKnown = {{{"SIMPLECYLINDRICAL", "Equirectangular"},
+  static constexpr std::string_view kOblique = "oblique";
+  static constexpr std::array<Known, 23> kKnown = {{{"SIMPLECYLINDRICAL", "Equirectangular"},
                                                     {"EQUIRECTANGULAR", "Equirectangular"},
                                                     {"EQUIDISTANTCYLINDRICAL", "Equirectangular"},
                                                     {"SINUSOIDAL", "Sinusoidal"},
@@ -143,12 +156,27 @@ std::string planetary_wkt(const PlanetaryMap& map) {
                                                     {"ROBINSON", "Robinson"},
                                                     {"MILLERCYLINDRICAL", "Miller_Cylindrical"},
                                                     {"VANDERGRINTEN", "VanDerGrinten"},
+                                                    {"POINTPERSPECTIVE", "Vertical_Near_Side_Perspective"},
+                                                    {"OBLIQUECYLINDRICAL", kOblique},
                                                     {"", ""}}};
   const auto* const known = std::ranges::find(kKnown, kind, &Known::kind);
-  if (known == kKnown.end() || !(map.equatorial_radius_m > 0.0)) return {};
+  const bool is_sized = map.equatorial_radius_m > 0.0;
+  MapParameters parameters = map.parameters;
+  parameters.height = map.distance_m - map.equatorial_radius_m;
+  const bool is_told =
+      known != kKnown.end() && (known->method != "Vertical_Near_Side_Perspective" || parameters.height > 0.0);
+  if (!is_told || !is_sized) {
+    if (is_sized || !kind.empty()) {
+      warnings.push_back(loss(
+          !is_told ? fmt::format("the map projection {} is not known: coordinates are metres of a map without a name",
+                                 printable(map.projection))
+                   : fmt::format("the label gives no radius of {}: coordinates are metres of a map without a name",
+                                 printable(map.target))));
+    }
+    return {};
+  }
   const double a = map.equatorial_radius_m;
   const double c = map.polar_radius_m > 0.0 ? map.polar_radius_m : a;
-  MapParameters parameters = map.parameters;
   double radius = a;
   const bool is_cylinder = known->method == "Equirectangular";
   if (is_cylinder) {
@@ -160,13 +188,15 @@ std::string planetary_wkt(const PlanetaryMap& map) {
              (known->method == "Stereographic" && std::abs(parameters.latitude) == 90.0)) {
     radius = c;
   }
-  const bool on_sphere = is_cylinder || !map.planetographic || a == c;
+  const bool is_oblique = known->method == kOblique;
+  const bool on_sphere = is_cylinder || is_oblique || !map.planetographic || a == c;
   const std::string beneath = geographic_wkt("GCS_" + map.target, "D_" + map.target, map.target, on_sphere ? radius : a,
                                              on_sphere ? 0.0 : a / (a - c), "Reference_Meridian");
   if (known->method.empty()) return beneath;
+  const std::string name = map.projection + ' ' + map.target;
+  if (is_oblique) return oblique_wkt(name, beneath, map);
   const bool is_secant = known->method == "Mercator_1SP" && parameters.parallel_1 != 0.0;
-  return map_wkt(map.projection + ' ' + map.target, beneath, is_secant ? "Mercator_2SP" : known->method, parameters,
-                 1.0);
+  return map_wkt(name, beneath, is_secant ? "Mercator_2SP" : known->method, parameters, 1.0);
 }
 
 }  // namespace isohf

@@ -3,6 +3,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "isohf/error.h"
+#include "isohf/projection.h"
 
 namespace isohf {
 
@@ -17,6 +21,7 @@ struct MapParameters {
   double grid_angle = 0.0;
   double easting = 0.0;
   double northing = 0.0;
+  double height = 0.0;  ///< of a viewpoint, metres
 };
 
 /// What the code of a method in GeoTIFF's keys (1.0, section 6.3.3.3) is called in WKT 1; empty for an unknown one.
@@ -45,10 +50,13 @@ struct PlanetaryMap {
   double polar_radius_m = 0.0;
   bool planetographic = false;  ///< latitudes are those of normals on the ellipsoid; else of a sphere
   MapParameters parameters;
+  GeoPoint pole = {};          ///< of an oblique cylinder
+  double pole_rotation = 0.0;  ///< degrees
+  double distance_m = 0.0;     ///< of a perspective's viewpoint, from the body's centre
 };
 
 /// Its WKT, as GDAL understands the labels: maps of planetocentric latitudes lie on a sphere of the equatorial radius,
-/// polar ones on that of the polar radius. Empty for a projection that is not known.
-[[nodiscard]] std::string planetary_wkt(const PlanetaryMap& map);
+/// polar ones on that of the polar radius. Empty, with a warning, for a map that is not known.
+[[nodiscard]] std::string planetary_wkt(const PlanetaryMap& map, std::vector<Warning>& warnings);
 
 }  // namespace isohf

@@ -219,6 +219,9 @@ void describe(IsohfProjSystem& system, IsohfProjInfo& info) {
   for (int dialect = 0; dialect < ISOHF_WKTS; ++dialect) {
     const char* const wkt = proj_as_wkt(context, system.system.get(), kDialects[dialect], one_line);
     system.wkt[dialect] = wkt != nullptr ? wkt : "";
+    // Of a method of its own PROJ makes a name that nobody reads, in ESRI's dialect.
+    if (dialect == ISOHF_WKT_ESRI && system.wkt[dialect].find("PROJECTION[\"PROJ_") != std::string::npos)
+      system.wkt[dialect].clear();
     info.wkt_bytes[dialect] = system.wkt[dialect].size() + 1;
   }
 }

@@ -192,7 +192,11 @@ class Isis3Source final : public FileSource {
     planet.parameters.scale = map.number("SCALEFACTOR").value_or(1.0);
     planet.parameters.parallel_1 = map.number("FIRSTSTANDARDPARALLEL").value_or(0.0);
     planet.parameters.parallel_2 = map.number("SECONDSTANDARDPARALLEL").value_or(0.0);
-    geo.system.wkt = planetary_wkt(planet);
+    planet.pole.latitude = map.number("POLELATITUDE").value_or(90.0);
+    planet.pole.longitude = map.number("POLELONGITUDE").value_or(0.0) * (to_west ? -1.0 : 1.0);
+    planet.pole_rotation = map.number("POLEROTATION").value_or(0.0);
+    planet.distance_m = map.number("DISTANCE").value_or(0.0) * 1000.0;
+    geo.system.wkt = planetary_wkt(planet, info_.warnings);
     if (map.number("ROTATION").value_or(0.0) != 0.0) {
       info_.warnings.push_back(loss("the map is rotated; its place is left out"));
       return;

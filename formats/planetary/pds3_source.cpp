@@ -241,11 +241,10 @@ class Placer {
     if (cylindrical_) planet.parameters.latitude = true_latitude_;
     planet.parameters.parallel_1 = map_.number("FIRST_STANDARD_PARALLEL").value_or(0.0);
     planet.parameters.parallel_2 = map_.number("SECOND_STANDARD_PARALLEL").value_or(0.0);
-    geo_.system.wkt = planetary_wkt(planet);
-    if (geo_.system.wkt.empty() && is_vicar_) {
-      warn(loss(fmt::format("the map projection {} is not known: coordinates are metres of a map without a name",
-                            planet.projection)));
-    }
+    planet.pole.latitude = map_.number("OBLIQUE_PROJ_POLE_LATITUDE").value_or(90.0);
+    planet.pole.longitude = map_.number("OBLIQUE_PROJ_POLE_LONGITUDE").value_or(0.0) * (to_west ? -1.0 : 1.0);
+    planet.pole_rotation = map_.number("OBLIQUE_PROJ_POLE_ROTATION").value_or(0.0);
+    geo_.system.wkt = planetary_wkt(planet, place_.warnings);
   }
 
   /// Which unit the map has, and how many of them lie between samples; false where the label does not say.

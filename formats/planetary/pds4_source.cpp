@@ -311,11 +311,10 @@ class Pds4Source final : public DescribedSource {
         kind == "Equirectangular" ? parameters.parallel_1 : parameter({"latitude_of_projection_origin"}, 0.0);
     const pugi::xml_node degrees = inner(system, "Geographic");
     if (projection) {
-      place.system.wkt = planetary_wkt(map);
-      if (place.system.wkt.empty()) {
-        info_.warnings.push_back(loss(fmt::format(
-            "the map projection {} is not known: coordinates are metres of a map without a name", printable(kind))));
-      }
+      map.pole = {(to_west ? -1.0 : 1.0) * parameter({"oblique_proj_pole_longitude"}, 0.0),
+                  parameter({"oblique_proj_pole_latitude"}, 90.0)};
+      map.pole_rotation = parameter({"oblique_proj_pole_rotation"}, 0.0);
+      place.system.wkt = planetary_wkt(map, info_.warnings);
       place.system.name = fmt::format("{} {}", kind, target);
       place.unit = HorizontalUnit::kMetre;
       const pugi::xml_node corner = inner(system, "Geo_Transformation");
@@ -335,7 +334,7 @@ class Pds4Source final : public DescribedSource {
       place.unit = HorizontalUnit::kUnknown;
     } else if (degrees) {
       map.projection.clear();
-      place.system.wkt = planetary_wkt(map);
+      place.system.wkt = planetary_wkt(map, info_.warnings);
       place.system.name = target;
       const auto west = number_in(cartography, "west_bounding_coordinate");
       const auto north = number_in(cartography, "north_bounding_coordinate");

@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "formats/files/text.h"
 #include "formats/georeference/map_wkt.h"
 #include "formats/georeference/reference_system.h"
 #include "formats/georeference/units.h"
@@ -506,6 +507,12 @@ void read_system(Keys& keys, GeoTiffPlace& place, double& degrees) {
   if (geographic) system.epsg = keys.code(kGeodeticCrs);
   if (projected || geographic) read_horizontal_unit(keys, projected, place, degrees);
   read_name(keys, projected, system);
+  if (!projected && !geographic && !system.name.empty()) {
+    place.warnings.push_back(
+        loss(fmt::format("the reference system \"{}\" is neither a map nor degrees, but a local one, or one of three "
+                         "dimensions: it is left out (`reference_system` names what it is)",
+                         printable(system.name))));
+  }
   read_ellipsoid(keys, system);
   const std::string citations = system.name + ' ' + keys.text(kCitation) + ' ' + keys.text(kGeodeticCitation) + ' ' +
                                 keys.text(kProjectedCitation);

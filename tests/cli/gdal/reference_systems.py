@@ -109,6 +109,8 @@ SYSTEMS = [
     ("Moon, degrees", "IAU_2015:30100", 20.0, 10.0),
     ("degrees on an own datum", 'GEOGCS["GCS_Tachikawa",DATUM["D_Tachikawa",SPHEROID["Bessel_1841",6377397.155,'
      '299.1528128]],PRIMEM["Greenwich",0],UNIT["Degree",0.0174532925199433]]', 139.4, 35.7),
+    ("Titan, oblique cylinder", "+proj=ob_tran +o_proj=eqc +o_lon_p=-10 +o_lat_p=150 +lon_0=20 +R=2575000", 25.0, -55.0),
+    ("Titan, perspective", "+proj=nsper +h=30000000 +lat_0=20 +lon_0=20 +R=2575000", 25.0, 22.0),
     ("Moon, Mercator", "+proj=merc +lat_ts=20 +lon_0=0 +R=1737400", 20.0, 10.0),
 ]
 

@@ -20,6 +20,7 @@ namespace isohf {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 constexpr std::size_t kLabelBytes = 1536;
 
@@ -160,6 +161,26 @@ TEST_F(Isis3, PlacesPixelsAndScalesThem) {
   const auto bare = open_raster(write(label(kTiles, 1, kWord, "") + tiles(3, 2, 1, false)), {});
   EXPECT_FALSE(bare->info().georeference.has_origin);
   EXPECT_TRUE(bare->info().warnings.empty());
+}
+
+/// What they mean reference_systems.py holds against GDAL.
+TEST_F(Isis3, MapsAreUnderstoodOrMissedAloud) {
+  const auto warnings_of = [&](const std::string& kind, const std::string& more = "") {
+    std::string mapping = kMapping;
+    mapping.replace(mapping.find("SimpleCylindrical"), 17, kind + "\n" + more);
+    const auto source = open_raster(write(label(kTiles, 1, kWord, mapping) + tiles(3, 2, 1, false)), {});
+    EXPECT_EQ(source->info().warnings.empty(), !source->info().georeference.system.wkt.empty());
+    return source->info().warnings;
+  };
+  EXPECT_THAT(warnings_of("ObliqueCylindrical", "PoleLatitude = 30\nPoleRotation = 10\n"), IsEmpty());
+  EXPECT_THAT(warnings_of("PointPerspective", "Distance = 30000\n"), IsEmpty());
+  for (const std::vector<Warning>& lost :
+       {warnings_of("Planar"), warnings_of("PointPerspective"), warnings_of("PointPerspective", "Distance = 1000\n")}) {
+    ASSERT_EQ(lost.size(), 1U);
+    EXPECT_EQ(lost.front().kind, Warning::Kind::kLoss);
+    EXPECT_THAT(lost.front(), HasSubstr("is not known: coordinates are metres of a map without a name"));
+  }
+  EXPECT_THAT(warnings_of("Planar").front(), HasSubstr("Planar"));
 }
 
 TEST_F(Isis3, TakesSpecialPixelsForVoids) {

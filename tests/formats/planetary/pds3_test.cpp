@@ -352,6 +352,23 @@ TEST_F(Pds3, CarriesOtherProjectionsInMetres) {
   EXPECT_TRUE(source->info().warnings.empty());
 }
 
+TEST_F(Pds3, MapsThatAreNotKnownAreMissedAloud) {
+  const std::string radii = "A_AXIS_RADIUS = 3396.19 <KM>\r\nC_AXIS_RADIUS = 3396.19 <KM>\r\n";
+  const auto warnings_of = [&](const std::string& lines) {
+    const std::string more =
+        "MAP_SCALE = 0.24 <KM/PIXEL>\r\nLINE_PROJECTION_OFFSET = 1\r\nSAMPLE_PROJECTION_OFFSET = 1.5\r\n";
+    return open_raster(write("u.img", attached(kImage, map(lines + more)) + samples(12, 2, true)), {})->info().warnings;
+  };
+  EXPECT_TRUE(warnings_of("MAP_PROJECTION_TYPE = \"OBLIQUE CYLINDRICAL\"\r\n" + radii).empty());
+  const std::vector<Warning> lost = warnings_of("MAP_PROJECTION_TYPE = \"PERSPECTIVE\"\r\n" + radii);
+  ASSERT_EQ(lost.size(), 1U);
+  EXPECT_EQ(lost.front().kind, Warning::Kind::kLoss);
+  EXPECT_THAT(lost.front(), HasSubstr("the map projection PERSPECTIVE is not known"));
+  const std::vector<Warning> unsized = warnings_of("MAP_PROJECTION_TYPE = SINUSOIDAL\r\n");
+  ASSERT_EQ(unsized.size(), 1U);
+  EXPECT_THAT(unsized.front(), HasSubstr("gives no radius of Mars"));
+}
+
 TEST_F(Pds3, ScalesAndMarksVoids) {
   const auto source =
       open_raster(write("v.img", attached(replaced(kImage, " LINES",

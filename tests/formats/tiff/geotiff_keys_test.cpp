@@ -134,6 +134,17 @@ TEST(GeoTiffPlace, KeysTellTheKindOfAModelOfOnesOwn) {
   EXPECT_EQ(place.georeference.unit, HorizontalUnit::kUnknown);
 }
 
+TEST(GeoTiffPlace, LocalSystemsAreMissedAloud) {
+  // What GDAL writes of LOCAL_CS.
+  const GeoTiffPlace local =
+      place_from_geotiff(Keys().code(kRaster, 1).text(1026, "Mine grid").code(3076, 9001).placed(), 100);
+  ASSERT_EQ(local.warnings.size(), 1U);
+  EXPECT_EQ(local.warnings[0].kind, Warning::Kind::kLoss);
+  EXPECT_NE(local.warnings[0].find("\"Mine grid\" is neither a map nor degrees"), std::string::npos);
+  // Nothing but how samples lie is no system.
+  EXPECT_TRUE(place_from_geotiff(Keys().code(kRaster, 1).placed(), 100).warnings.empty());
+}
+
 TEST(GeoTiffPlace, EllipsoidsTellTheBody) {
   const auto system = [](Keys keys) { return place_from_geotiff(keys.placed(), 9).georeference.system; };
   EXPECT_EQ(system(Keys().code(kModel, 2).real(2057, 3396190.0).real(2058, 3396190.0)).body, "Mars");
