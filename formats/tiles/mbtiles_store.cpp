@@ -55,18 +55,21 @@ class MbtilesStore final : public TileStore {
   }
 
   [[nodiscard]] std::string encoding() override {
-    const auto text = [&](const char* name) {
-      std::vector<std::byte> bytes;
-      (void)take(bytes, [&](IsohfMbtilesTake taking, void* to, IsohfMbtilesMessage* message) {
-        return module_.text(file_, name, taking, to, message);
-      });
-      return std::string(text_of(bytes));
-    };
     const std::string said = text("encoding");
     return said.empty() ? encoding_in_json(text("json")) : said;
   }
+  [[nodiscard]] bool says_other_rows() override { return lower_case(text("scheme")) == "xyz"; }
 
  private:
+  /// A value of the metadata; empty where it is not there.
+  [[nodiscard]] std::string text(const char* name) const {
+    std::vector<std::byte> bytes;
+    (void)take(bytes, [&](IsohfMbtilesTake taking, void* to, IsohfMbtilesMessage* message) {
+      return module_.text(file_, name, taking, to, message);
+    });
+    return std::string(text_of(bytes));
+  }
+
   /// The file's size. SQLite takes what is missing of a last page for zeros, and these for an empty page.
   static std::uint64_t whole_pages_bytes(const std::string& path) {
     const RawFile file(path);

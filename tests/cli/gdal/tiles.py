@@ -301,6 +301,8 @@ def refused(isohf, folder):
     base.commit()
     base.close()
     isohf.refuses("none of tiles", "info", folder / "other.mbtiles")
+    isohf.refuses("scheme xyz", "convert", mbtiles(folder / "xyz.mbtiles", tiles, {"encoding": "mapbox", "scheme": "xyz"}), "-o",
+                  folder / "n.isohf", "--strict")
     isohf.refuses("holds no tiles", "info", mbtiles(folder / "empty.mbtiles", {}))
     isohf.refuses("must be from 0 to", "info", mbtiles(folder / "far.mbtiles", {(3, 9, 2): tiles[BLOCK[0]]}))
     stored = mbtiles(folder / "g.mbtiles", tiles).read_bytes()
