@@ -10,9 +10,11 @@
 namespace isohf {
 namespace {
 
-bool is_system_of(const Georeference& own, const Georeference& other) {
+/// is_ballpark  their datums are taken for one
+bool is_system_of(const Georeference& own, const Georeference& other, bool is_ballpark) {
   if (!own.has_origin || own.unit != other.unit) return false;
-  if (const auto same = are_same(own.system, other.system)) return *same;
+  const auto same = are_same(own.system, other.system);
+  if (same && (*same || !is_ballpark)) return *same;
   // Longitudes and latitudes of a body that names no system are known by its ellipsoid.
   return own.unit == HorizontalUnit::kDegree && own.system.semi_major_axis_m &&
          own.system.semi_major_axis_m == other.system.semi_major_axis_m &&
@@ -76,7 +78,7 @@ std::shared_ptr<const GridSystem> understand_grid_system(ArchiveReader& archive,
     auto system = std::make_shared<GridSystem>(GridSystem{way.map, there.georeference});
     const auto natural = grid_georeference(metadata, natural_grid(metadata));
     for (const Georeference& known : {natural.value_or(own), own}) {
-      if (system->place.has_origin || !is_system_of(known, there.georeference)) continue;
+      if (system->place.has_origin || !is_system_of(known, there.georeference, way.is_ballpark)) continue;
       system->place = known;
       system->place.system = there.georeference.system;
     }

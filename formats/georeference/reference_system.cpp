@@ -31,6 +31,12 @@ std::string shown_name(const std::string& name, const std::string& text) {
   return name.empty() || name == "unknown" ? shortened(text) : name;
 }
 
+/// Radii are written with more or fewer digits.
+bool are_alike(const Ellipsoid& a, const Ellipsoid& b) {
+  return std::abs(a.semi_major_axis_m / b.semi_major_axis_m - 1.0) < 1e-9 &&
+         std::abs(a.inverse_flattening - b.inverse_flattening) < 1e-6;
+}
+
 /// libproj, SQLite and what they read of proj.db.
 constexpr std::uint64_t kProjBytes = 14'000'000;
 
@@ -75,10 +81,14 @@ class ProjSystem final : public UnderstoodSystem {
     if (module_.same(system_, theirs.system_) != 0) return true;
     // PROJ does not hold one method's variants against each other (polar stereographic by its scale, or by a parallel).
     const Description& other_one = theirs.description_;
-    if (!description_.is_projected || !other_one.is_projected || description_.datum != other_one.datum ||
-        description_.ellipsoid != other_one.ellipsoid || description_.unit != other_one.unit) {
+    const bool is_earth = std::abs(description_.ellipsoid.semi_major_axis_m / 6378137.0 - 1.0) < 0.01;
+    if (description_.is_projected != other_one.is_projected || description_.unit != other_one.unit ||
+        !are_alike(description_.ellipsoid, other_one.ellipsoid)) {
       return false;
     }
+    // On other bodies an equal ellipsoid is the same datum, whatever its name.
+    if (is_earth && description_.datum != other_one.datum) return false;
+    if (!description_.is_projected) return !is_earth && description_.prime_meridian_deg == other_one.prime_meridian_deg;
     constexpr double kSameMetres = 1e-6;
     int compared = 0;
     for (double latitude = -80.0; latitude <= 80.0; latitude += 20.0) {

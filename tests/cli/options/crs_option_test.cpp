@@ -141,6 +141,43 @@ TEST_F(CrsOption, RestoreToTheArchivesOwnSystemAddsNoBorder) {
   EXPECT_EQ(read_text(folder_ / "own.asc"), read_text(folder_ / "plain.asc"));
 }
 
+/// Of degrees that have no code, in words of other programs: the same, without a datum's name, by the ellipsoid alone.
+TEST_F(CrsOption, RestoreToTheArchivesOwnDegreesAddsNoBorderHoweverTheyAreSpelled) {
+  const auto degrees = [](const std::string& name, const std::string& datum, const std::string& ellipsoid) {
+    return "GEOGCS[\"" + name + "\",DATUM[\"" + datum + "\",SPHEROID[\"s\"," + ellipsoid +
+           "]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]]";
+  };
+  struct Case {
+    std::string own;
+    std::vector<std::string> also;
+    std::string other;
+  };
+  const Case cases[] = {{degrees("GCS_Tachikawa", "D_Tachikawa", "6377397.155,299.1528128"),
+                         {degrees("Tachikawa", "Tachikawa", "6377397.155,299.1528128"), "+proj=longlat +ellps=bessel"},
+                         "+proj=longlat +ellps=intl"},
+                        {degrees("GCS_Mars", "D_Mars", "3396190,0"),
+                         {"IAU_2015:49900", "+proj=longlat +R=3396190"},
+                         "+proj=longlat +a=3396190 +b=3376200"}};
+  std::string small = small_grid();
+  small.replace(small.find("cellsize"), small.find('\n', small.find("cellsize")) - small.find("cellsize"),
+                "cellsize 0.001");
+  write_text(grid_, small);
+  for (const Case& of : cases) {
+    ASSERT_EQ(convert(of.own, {"--projection", "transverse-mercator"}).exit_code, 0);
+    const auto size_in = [&](const std::string& system) {
+      const RunResult result =
+          run_isohf({"export", archive_, folder_ / "own.tif", "--crs", system, "--quiet", "--overwrite", "--json"});
+      EXPECT_EQ(result.exit_code, 0) << result.err;
+      const json said = json::parse(result.out);
+      return std::pair(said.at("width").get<int>(), said.at("voids").get<int>());
+    };
+    const auto own = size_in(of.own);
+    EXPECT_EQ(own.second, 0);
+    for (const std::string& system : of.also) EXPECT_EQ(size_in(system), own) << system;
+    EXPECT_NE(size_in(of.other), own);
+  }
+}
+
 TEST_F(CrsOption, MapsThatDifferInOneParameterNeverJoin) {
   const auto prj = [](const char* latitude) {
     return std::string("Projection TRANSVERSE\nDatum WGS84\nUnits METERS\nParameters\n0.9996\n9 0 0\n") + latitude +

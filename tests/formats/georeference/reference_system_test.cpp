@@ -780,6 +780,22 @@ TEST_F(UnderstandSystem, OneParameterMakesAnotherSystem) {
   }
 }
 
+TEST_F(UnderstandSystem, OnOtherBodiesAnEllipsoidIsADatum) {
+  const auto system = [](const std::string& text) {
+    ReferenceSystem found;
+    found.wkt = understand_system(text)->description().wkt2;
+    return found;
+  };
+  const ReferenceSystem mars = system("IAU_2015:49900");
+  EXPECT_EQ(are_same(mars, system("+proj=longlat +R=3396190")), true);
+  EXPECT_EQ(are_same(mars, system("+proj=longlat +R=3396190 +pm=10")), false);
+  EXPECT_EQ(are_same(mars, system("+proj=longlat +a=3396190 +b=3376200")), false);
+  EXPECT_EQ(are_same(system("IAU_2015:49910"), system("+proj=eqc +R=3396190")), true);
+  EXPECT_EQ(are_same(system("IAU_2015:49910"), system("+proj=eqc +R=3396190 +lon_0=1")), false);
+  // On the Earth it is none: Bessel's is that of a dozen.
+  EXPECT_EQ(are_same(system("EPSG:4301"), system("EPSG:4289")), false);
+}
+
 TEST_F(UnderstandSystem, MapsThatKeysSpellOutAreMapsOfTheirParameters) {
   // Lambert azimuthal equal area, 47 N 11 E, on ETRS89, kilometres; then one parameter less, and an unknown method.
   const auto keys = [](std::uint16_t method, bool has_latitude) {
