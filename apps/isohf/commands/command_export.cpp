@@ -130,7 +130,8 @@ struct ExportGrid {
 
 ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
   const Metadata& metadata = archive.metadata();
-  const WorldBounds ground = options.bbox ? ground_in_box(archive, *options.bbox) : ground_here(metadata);
+  const WorldBounds ground =
+      options.bbox ? ground_in_box(archive, *options.bbox, AcrossEnds::kGoesOn) : ground_here(metadata);
   const bool area = samples_are_areas(metadata);
   const auto& asked = options.bbox;
   const auto box =

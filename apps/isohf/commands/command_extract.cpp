@@ -78,7 +78,8 @@ int command_extract(const Arguments& arguments) {
     const TileRange here = plane_tiles_of(archive, options->plane);
     if (!options->bbox) return here;
     const TileGrid grid = archive.metadata().plane_grid(options->plane);
-    const TileRange touched = intersection(tiles_touching(grid, ground_in_box(archive, *options->bbox)), here);
+    const TileRange touched =
+        intersection(tiles_touching(grid, ground_in_box(archive, *options->bbox, AcrossEnds::kRefused)), here);
     if (touched.is_empty()) {
       throw Error(ErrorCode::kInvalidArgument,
                   options->archive + ": is a part of its land, and holds no tile that --bbox touches");

@@ -4,17 +4,16 @@
 
 #include "isohf/error.h"
 #include "isohf/restore/archive_geometry.h"
-#include "isohf/restore/sample_grids.h"
 #include "isohf/surface.h"
 
 namespace isohf::cli {
 
-WorldBounds ground_in_box(ArchiveReader& archive, const BoundingBox& box) {
+WorldBounds ground_in_box(ArchiveReader& archive, const BoundingBox& box, AcrossEnds across) {
   const Metadata& metadata = archive.metadata();
   if (is_warped(metadata)) understand_source(archive);
   const WorldBounds ground = [&] {
     try {
-      return world_bounds(metadata, {box.west, box.south, box.east, box.north});
+      return world_bounds(metadata, {box.west, box.south, box.east, box.north}, across);
     } catch (const Error& error) {
       throw error.within(fmt::format("--bbox {},{},{},{}", box.west, box.south, box.east, box.north));
     }

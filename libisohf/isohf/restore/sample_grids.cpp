@@ -75,7 +75,7 @@ std::optional<double> once_round(const Metadata& metadata) {
 }
 
 /// The box by as many whole turns East that it lies on the archive's ground.
-MapBounds turned(const MapBounds& box, const Metadata& metadata, double turn) {
+MapBounds turned(const MapBounds& box, const Metadata& metadata, double turn, AcrossEnds across) {
   const SourceColumns columns(metadata.source);
   const double west = columns.coordinate(metadata.valid.x0);
   const double east = columns.coordinate(metadata.valid.x1);
@@ -95,6 +95,7 @@ MapBounds turned(const MapBounds& box, const Metadata& metadata, double turn) {
   }
   const MapBounds there = by(first);
   const MapBounds again = by(first + 1.0);
+  if (across == AcrossEnds::kGoesOn && east - west >= turn * (1.0 - 1e-9)) return again;
   refuse(
       fmt::format("lies at the East end and at the West end of the archive's ground, {:.10g} to {:.10g}, which is "
                   "no rectangle of it; give {:.10g} to {:.10g} and {:.10g} to {:.10g} one after the other",
@@ -714,7 +715,7 @@ std::optional<SampleGrid> part_of(const SampleGrid& grid, const WorldBounds& gro
   return part;
 }
 
-WorldBounds world_bounds(const Metadata& metadata, const MapBounds& asked) {
+WorldBounds world_bounds(const Metadata& metadata, const MapBounds& asked, AcrossEnds across) {
   const SourceRecord& source = metadata.source;
   if (!source.origin_x || !source.origin_y || !(source.crs_spacing_x > 0.0) || !(source.crs_spacing_y > 0.0)) {
     refuse("the archive does not say where its source lay; coordinates mean nothing");
@@ -732,7 +733,7 @@ WorldBounds world_bounds(const Metadata& metadata, const MapBounds& asked) {
     return {map.west - on.origin.easting, on.origin.northing - map.north, map.east - on.origin.easting,
             on.origin.northing - map.south};
   }
-  if (const auto turn = once_round(metadata)) box = turned(box, metadata, *turn);
+  if (const auto turn = once_round(metadata)) box = turned(box, metadata, *turn, across);
   const SourceColumns columns(source);
   const double to_z = source.spacing_z / source.crs_spacing_y;
   WorldBounds bounds;

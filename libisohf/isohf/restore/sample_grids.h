@@ -39,12 +39,18 @@ struct Turn {
 /// Throws Error{kInvalidArgument}: another raster is in another system than the archive's source.
 [[noreturn]] void refuse_system(const SourceInfo& other, const ReferenceSystem& own);
 
+/// What becomes of a box that lies at both ends of an archive that goes round the body.
+enum class AcrossEnds : std::uint8_t {
+  kRefused,  ///< it is no rectangle of the world
+  kGoesOn,   ///< beyond the East end; RowReader finds each column by whole turns
+};
+
 /// The part of the world in a box of the source's coordinates. Longitudes are compared modulo 360 degrees; West above
 /// East crosses the 180th meridian.
 /// Throws Error{kInvalidArgument} where the archive does not know where its source lay, where West is not less than
-/// East in a source that is not in degrees, and where the ground lies at both ends of the archive, so that it is no
-/// rectangle there.
-[[nodiscard]] WorldBounds world_bounds(const Metadata& metadata, const MapBounds& box);
+/// East in a source that is not in degrees, and where the ground lies at both ends of the archive, unless it goes round
+/// and `across` lets the box go on.
+[[nodiscard]] WorldBounds world_bounds(const Metadata& metadata, const MapBounds& box, AcrossEnds across);
 
 /// The samples of the source itself in a box of its own system, where `system` is that and knows its grid; longitudes as
 /// it counts them. nullopt where there are none.

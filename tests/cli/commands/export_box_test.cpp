@@ -98,21 +98,44 @@ TEST_F(ExportBox, IsTheSameOnAMapFromWhicheverSideItIsCounted) {
   }
 }
 
-TEST_F(ExportBox, RefusesGroundAtBothEndsOfAGlobe) {
+TEST_F(ExportBox, GoesOnAcrossTheEndsOfAGlobe) {
   write_degrees(folder / "globe", 720, 360, -180.0, -90.0, 0.5, land);
   for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--wrap-x"}}) {
     SCOPED_TRACE(more.size());
     convert("globe.flt", more);
-    EXPECT_THAT(
-        refused("170,-10,-175,10"),
-        HasSubstr("--bbox 170,-10,-175,10: lies at the East end and at the West end of the archive's ground, -180 "
-                  "to 180, which is no rectangle of it; give 170 to 180 and -180 to -175 one after the other"));
-    EXPECT_EQ(exported("170,-10,180,10").info.width, 20);
-    EXPECT_EQ(exported("-180,-10,-175,10").info.width, 10);
+    const Raster west = exported("170,-10,180,10");
+    const Raster east = exported("-180,-10,-175,10");
+    EXPECT_EQ(west.info.width, 20);
+    EXPECT_EQ(east.info.width, 10);
+    for (const std::string box : {"170,-10,-175,10", "170,-10,185,10", "-190,-10,-175,10"}) {
+      SCOPED_TRACE(box);
+      const Raster both = exported(box);
+      ASSERT_EQ(both.info.width, 30);
+      EXPECT_NEAR(both.info.georeference.origin_x, 170.25, 1e-9);
+      for (std::int64_t row = 0; row < 40; ++row) {
+        for (std::int64_t c = 0; c < 30; ++c)
+          ASSERT_EQ(both.at(c, row), c < 20 ? west.at(c, row) : east.at(c - 20, row)) << c;
+      }
+    }
     // A whole turn, or a little more: all of it.
     EXPECT_EQ(exported("-180,-90,180,90").info.width, 720);
     EXPECT_EQ(exported("-180.0001,-90,180.0001,90").info.width, 720);
+    // Tiles of a part are a rectangle of tiles.
+    const RunResult part =
+        run_isohf({"extract", folder / "a.isohf", "-o", folder / "p.isohf", "--bbox", "170,-10,-175,10"});
+    EXPECT_EQ(part.exit_code, 2);
+    EXPECT_THAT(part.err,
+                HasSubstr("which is no rectangle of it; give 170 to 180 and -180 to -175 one after the other"));
   }
+}
+
+TEST_F(ExportBox, RefusesGroundAtBothEndsOfWhatGoesNotRound) {
+  write_degrees(folder / "most", 700, 360, -180.0, -90.0, 0.5, land);
+  convert("most.flt", {});
+  EXPECT_THAT(
+      refused("160,-10,-175,10"),
+      HasSubstr("--bbox 160,-10,-175,10: lies at the East end and at the West end of the archive's ground, -180 "
+                "to 170, which is no rectangle of it; give 160 to 170 and -180 to -175 one after the other"));
 }
 
 TEST_F(ExportBox, CountsLongitudesRoundTheBody) {
