@@ -52,7 +52,6 @@ struct ExportOptions {
   WorkOptions work;
   RasterOptions raster;
   std::optional<BoundingBox> bbox;
-  std::optional<SampleType> type;
   std::optional<std::pair<double, double>> z_range;
   std::optional<double> z_scale;
   std::optional<double> z_offset;
@@ -70,13 +69,6 @@ GridSize parse_side_or_size(const std::string& text) {
   if (text.find_first_of("xX") != std::string::npos) return parse_size(text, 1, kMostSide);
   const std::int64_t side = parse_whole_number(text, 1, kMostSide);
   return {side, side};
-}
-
-SampleType parse_type(const std::string& text) {
-  constexpr std::array<SampleType, 8> kTypes = {SampleType::kUint8,   SampleType::kUint16, SampleType::kInt16,
-                                                SampleType::kUint32,  SampleType::kInt32,  SampleType::kFloat16,
-                                                SampleType::kFloat32, SampleType::kFloat64};
-  return kTypes[parse_word(text, {"u8", "u16", "i16", "u32", "i32", "f16", "f32", "f64"})];
 }
 
 std::optional<ExportOptions> parse_export(const Arguments& arguments) {
@@ -97,8 +89,7 @@ std::optional<ExportOptions> parse_export(const Arguments& arguments) {
   line.option("--overlap", "K", "Samples that neighbouring tiles share (default 0; 1 for shared edges)",
               [&](const std::string& text) { options.overlap = parse_whole_number(text, 0, 65536); });
   line.group("Samples");
-  line.option("--type", "TYPE", "u8, u16, i16, u32, i32, f16, f32 or f64 (default: by the format)",
-              [&](const std::string& text) { options.type = parse_type(text); });
+  add_type_option(line, "by the format", options.raster);
   line.option("--z-range", "MIN:MAX",
               "Elevations of the lowest and highest sample of an integer type (default of u8 and "
               "u16: those that there are, which takes another pass)",
@@ -259,7 +250,7 @@ class Exporter {
   }
 
   SampleMapping choose_mapping() {
-    const SampleType type = options_.type.value_or(default_type(options_.raster.output));
+    const SampleType type = options_.raster.type.value_or(default_type(options_.raster.output));
     if (options_.z_scale || options_.z_offset) {
       return {type, options_.z_scale.value_or(1.0), options_.z_offset.value_or(0.0)};
     }

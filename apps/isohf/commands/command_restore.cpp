@@ -75,6 +75,7 @@ std::optional<RestoreOptions> parse_restore(const Arguments& arguments) {
       options.like);
   add_size_options(line, "Write so many samples over the source's ground", options.raster);
   add_method_option(line, "hex; the source's own samples where they are kept", options.raster);
+  add_type_option(line, "the source's, as far as the format holds it", options.raster);
   add_clamp_option(line, "RASTER's type", options.raster);
   line.flag("--round", "Round the source's samples to the nearest that a floating RASTER holds, instead of refusing",
             options.rounds);
@@ -181,7 +182,7 @@ class Restorer {
     // Text holds any number, and has no place for a scale.
     const bool as_elevations =
         raster_kind(options_.raster.output) == RasterKind::kAsc && (kept.z_scale != 1.0 || kept.z_offset != 0.0);
-    written.type = restored_type(options_.raster.output, kept.type);
+    written.type = options_.raster.type.value_or(restored_type(options_.raster.output, kept.type));
     if (as_elevations) written = {SampleType::kFloat64, 1.0, 0.0};
     auto void_value = record.void_values.empty() ? std::nullopt : std::optional(record.void_values.front());
     // OpenEXR has no void value; what came from there has none but the user's.
@@ -224,6 +225,7 @@ class Restorer {
           const double value = load_sample(kept.type)(raw.data() + *refused * size_bytes(kept.type));
           const bool is_void = record.is_void(value);
           std::string remedy = is_void ? "write .tif, or give --method hex for a void value of its own" : "write .tif";
+          if (options_.raster.type) remedy = "without --type it is " + to_string(kept.type) + ", as in the source";
           if (is_floating(written.type) && !options_.rounds) remedy = "--round takes the nearest, .tif holds it";
           refuse_sample(options_.raster.output, written.type, sample % grid_.width, row + sample / grid_.width,
                         fmt::format("{:.9g}{}", value, is_void ? " (void)" : ""), remedy);
@@ -248,8 +250,9 @@ class Restorer {
   Restored run_surface() {
     const Metadata& metadata = archive_.metadata();
     bool has_voids = needs_void(metadata, grid_, options_.raster.output);
-    SampleMapping mapping{restored_type(options_.raster.output, sample_type_from_string(metadata.source.sample_type)),
-                          metadata.source.z_scale, metadata.source.z_offset};
+    const SampleType type = options_.raster.type.value_or(
+        restored_type(options_.raster.output, sample_type_from_string(metadata.source.sample_type)));
+    SampleMapping mapping{type, metadata.source.z_scale, metadata.source.z_offset};
     const RestoreMethod method = options_.raster.method.value_or(usual_method(metadata, grid_));
     Restored restored;
     if (takes_decimals(metadata, mapping)) {

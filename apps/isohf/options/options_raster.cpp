@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 
 #include "formats/files/text.h"
@@ -103,6 +104,16 @@ void add_method_option(CommandLine& line, const std::string& without, RasterOpti
   line.option("--method", "NAME", fmt::format("hex, barycentric or average (default {})", without),
               [&](const std::string& text) { options.method = restore_method_from_string(text); });
   line.words({"hex", "barycentric", "average"});
+}
+
+void add_type_option(CommandLine& line, const std::string& without, RasterOptions& options) {
+  line.option("--type", "TYPE", fmt::format("u8, u16, i16, u32, i32, f16, f32 or f64 (default: {})", without),
+              [&](const std::string& text) {
+                constexpr std::array<SampleType, 8> kTypes = {
+                    SampleType::kUint8, SampleType::kUint16,  SampleType::kInt16,   SampleType::kUint32,
+                    SampleType::kInt32, SampleType::kFloat16, SampleType::kFloat32, SampleType::kFloat64};
+                options.type = kTypes[parse_word(text, {"u8", "u16", "i16", "u32", "i32", "f16", "f32", "f64"})];
+              });
 }
 
 void add_clamp_option(CommandLine& line, const std::string& type, RasterOptions& options) {

@@ -19,6 +19,7 @@ struct RasterOptions {
   std::string system;  ///< a reference system; empty: the archive's own
   std::optional<RestoreMethod> method;
   bool clamp_range = false;
+  std::optional<SampleType> type;  ///< of the raster's samples
 };
 
 /// Samples on a side, at most.
@@ -41,6 +42,8 @@ void add_size_options(CommandLine& line, const std::string& size_description, Ra
                                               bool quiet);
 /// --method. `without` is what --help says of the default.
 void add_method_option(CommandLine& line, const std::string& without, RasterOptions& options);
+/// --type. `without` is what --help says of the default.
+void add_type_option(CommandLine& line, const std::string& without, RasterOptions& options);
 /// --clamp-range. `type` is whose range it is.
 void add_clamp_option(CommandLine& line, const std::string& type, RasterOptions& options);
 

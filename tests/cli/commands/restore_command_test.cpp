@@ -287,6 +287,34 @@ TEST_F(RestoreCommand, SamplesThatAnotherTypeDoesNotHoldAreRefusedWithARemedy) {
                  "uint8 does not hold; --clamp-range moves it (elevations run from ");
 }
 
+TEST_F(RestoreCommand, TypeIsThatOfTheSamples) {
+  write_stripes(folder / "stripes.tif", SampleType::kInt16);
+  for (const std::vector<std::string>& kept : {std::vector<std::string>{"--lossless"}, {}}) {
+    convert(folder / "stripes.tif", kept);
+    const Raster as_source = restore("back.tif");
+    EXPECT_EQ(as_source.info.sample_type, SampleType::kInt16);
+    const Raster floats = restore("back.tif", {"--type", "f32"});
+    EXPECT_EQ(floats.info.sample_type, SampleType::kFloat32);
+    for (std::size_t i = 0; i < as_source.elevations.size(); ++i) {
+      ASSERT_NEAR(floats.elevations[i], as_source.elevations[i], kept.empty() ? 0.5 : 0.0);
+    }
+  }
+  convert(folder / "stripes.tif", {"--lossless"});
+  EXPECT_EQ(restore("back.tif", {"--type", "u8"}).info.sample_type, SampleType::kUint8);
+  write_raster(
+      folder / "low.tif",
+      [] {
+        RasterSpec spec;
+        spec.width = spec.height = 8;
+        spec.sample_type = SampleType::kInt16;
+        return spec;
+      }(),
+      std::vector<std::byte>(128, std::byte{0xFF}));
+  convert(folder / "low.tif", {"--lossless"});
+  expect_refused(run("none.tif", {"--type", "u8"}), 2,
+                 "is -1, which uint8 does not hold; without --type it is int16, as in the source");
+}
+
 TEST_F(RestoreCommand, SaysThatTheArchiveComesFirst) {
   convert(kPeaks);
   const RunResult swapped = run_isohf({"restore", kPeaks, folder / "b.isohf"});
