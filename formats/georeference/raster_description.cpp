@@ -84,6 +84,9 @@ void RasterDescription::describe(SourceInfo& info) const {
   describe_place(info.georeference);
   const std::string wkt = word("crs_wkt");
   if (!wkt.empty() && !read_wkt(wkt, info)) refuse("crs_wkt is no WKT of a map's reference system");
+  ReferenceSystem& system = info.georeference.system;
+  if (const std::string datum = word("vertical_datum"); !datum.empty()) system.vertical_datum = datum;
+  if (const auto heights = code("vertical_epsg")) system.vertical_epsg = heights;
 }
 
 void RasterDescription::describe_place(Georeference& place) const {
@@ -114,10 +117,7 @@ void RasterDescription::describe_place(Georeference& place) const {
   place.origin_y = y.value_or(0.0);
   place.system.name = word("crs_name");
   place.system.body = word("body");
-  if (const auto code = number("crs_epsg")) {
-    if (!(*code > 0 && *code < 1e6) || *code != std::floor(*code)) refuse("crs_epsg is no EPSG code");
-    place.system.epsg = static_cast<int>(*code);
-  }
+  place.system.epsg = code("crs_epsg");
 }
 
 void RasterDescription::refuse(const std::string& what) const {
@@ -145,6 +145,13 @@ std::optional<double> RasterDescription::number(const char* key) const {
   if (found == json_->value.end() || found->is_null()) return std::nullopt;
   if (!found->is_number() || !std::isfinite(found->get<double>())) refuse(fmt::format("{} is no number", key));
   return found->get<double>();
+}
+
+std::optional<int> RasterDescription::code(const char* key) const {
+  const auto code = number(key);
+  if (!code) return std::nullopt;
+  if (!(*code > 0 && *code < 1e6) || *code != std::floor(*code)) refuse(fmt::format("{} is no EPSG code", key));
+  return static_cast<int>(*code);
 }
 
 std::string RasterDescription::word(const char* key) const {

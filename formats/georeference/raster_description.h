@@ -42,6 +42,7 @@ class RasterDescription {
   [[nodiscard]] SampleType sample_type() const;
   /// nullopt where it is absent or null.
   [[nodiscard]] std::optional<double> number(const char* key) const;
+  [[nodiscard]] std::optional<int> code(const char* key) const;
   /// Empty where it is absent.
   [[nodiscard]] std::string word(const char* key) const;
 

@@ -10,6 +10,7 @@
 #include <exception>
 #include <map>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "formats/georeference/reference_system.h"
@@ -110,7 +111,6 @@ class Agreement {
 
 void agree_on_heights(ReferenceSystem& ours, const ReferenceSystem& other, Agreement& agreement) {
   agreement.same(ours.body, other.body, "body");
-  agreement.same(ours.vertical_epsg, other.vertical_epsg, "vertical EPSG code");
   // A .hgt, DTED or USGS DEM names what its heights are above, by no code.
   const auto contradicts = [](const ReferenceSystem& one, const ReferenceSystem& two) {
     const bool is_name = one.vertical_datum == "EGM96" || one.vertical_datum == "NAVD88";
@@ -120,6 +120,12 @@ void agree_on_heights(ReferenceSystem& ours, const ReferenceSystem& other, Agree
   if (contradicts(ours, other) || contradicts(other, ours)) {
     agreement.differ("vertical datum", other.vertical_datum, ours.vertical_datum);
   }
+  // Names differ from format to format: the one beside a code, and of these the longest, whichever file comes first.
+  const auto worth = [](const ReferenceSystem& of) {
+    return std::tuple(of.vertical_epsg.has_value(), of.vertical_datum.size(), of.vertical_datum);
+  };
+  if (!other.vertical_datum.empty() && worth(ours) < worth(other)) ours.vertical_datum = other.vertical_datum;
+  agreement.same(ours.vertical_epsg, other.vertical_epsg, "vertical EPSG code");
 }
 
 void agree_on_system(ReferenceSystem& ours, const ReferenceSystem& other, Agreement& agreement) {

@@ -147,8 +147,10 @@ MosaicSamples widened(const SampleKind& kind) {
     samples.kind.valid_min = gap + 1.0;  // which tells that no file means it
   }
   samples.gap = stored_sample(samples.kind.type, gap);
-  samples.notes.push_back(fmt::format("{} has no number to spare for voids in all files; samples become {}",
-                                      to_string(kind.type), to_string(samples.kind.type)));
+  samples.notes.push_back(
+      fmt::format("{} has no number to spare for voids in all files; samples become {} (`void_values` V gives them "
+                  "one)",
+                  to_string(kind.type), to_string(samples.kind.type)));
   return samples;
 }
 

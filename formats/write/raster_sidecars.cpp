@@ -141,6 +141,8 @@ std::string json_text(const std::string& extension, const RasterSpec& spec) {
     if (place.system.epsg) json["crs_epsg"] = *place.system.epsg;
     if (!place.system.epsg && !place.system.wkt.empty()) json["crs_wkt"] = place.system.wkt;
     if (!place.system.body.empty()) json["body"] = place.system.body;
+    if (!place.system.vertical_datum.empty()) json["vertical_datum"] = place.system.vertical_datum;
+    if (place.system.vertical_epsg) json["vertical_epsg"] = *place.system.vertical_epsg;
   }
   // What is no UTF-8 in a name found in a file must not keep it from being written.
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";

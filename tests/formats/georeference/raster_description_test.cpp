@@ -78,6 +78,21 @@ TEST(RasterDescription, GivesAPngPlaceAndMeaning) {
   EXPECT_TRUE(std::isnan(found[3]));
 }
 
+TEST(RasterDescription, KeepsWhatHeightsAreAbove) {
+  const TemporaryFolder folder;
+  RasterSpec spec = picture_spec();
+  const std::uint16_t codes[] = {0, 100, 65535, 7};
+  for (const std::optional<int> code : {std::optional(5703), std::optional<int>()}) {
+    spec.georeference->system.vertical_datum = "NAVD88 height";
+    spec.georeference->system.vertical_epsg = code;
+    write_raster(folder / "a.r16", spec, std::as_bytes(std::span(codes)));
+    const ReferenceSystem system = open_raster(folder / "a.r16", {})->info().georeference.system;
+    EXPECT_EQ(system.vertical_datum, "NAVD88 height");
+    EXPECT_EQ(system.vertical_epsg, code);
+    EXPECT_EQ(system.epsg, 4326);
+  }
+}
+
 TEST(RasterDescription, OfRowsInAnotherOrderIsRefused) {
   const TemporaryFolder folder;
   write_picture(folder / "a.png");

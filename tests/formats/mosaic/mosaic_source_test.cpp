@@ -283,6 +283,29 @@ TEST(MosaicSource, FilesThatDisagreeAreRefusedByName) {
   EXPECT_THAT(why_refused({folder / "a.tif", folder / "none.tif"}), HasSubstr("none.tif: no such file"));
 }
 
+TEST(MosaicSource, HeightsAreNamedAlikeWhicheverFileComesFirst) {
+  const TemporaryFolder folder;
+  RasterSpec spec = placed_spec(30, 10, SampleType::kFloat32, Registration::kArea);
+  const auto cut = [&](const char* name, std::int64_t column, const char* datum, std::optional<int> code) {
+    spec.georeference->system.vertical_datum = datum;
+    spec.georeference->system.vertical_epsg = code;
+    raster_of<float>(spec, [](auto, auto) { return 1.0; }).cut(folder / name, {column, 0, 10, 10});
+  };
+  cut("named.tif", 0, "EGM96", std::nullopt);  // as .hgt files say it
+  cut("coded.tif", 10, "EGM96 height", 5773);
+  cut("silent.tif", 20, "", std::nullopt);
+  std::vector<std::string> files = {folder / "coded.tif", folder / "named.tif", folder / "silent.tif"};
+  do {
+    const ReferenceSystem system = open_mosaic(files)->info().georeference.system;
+    EXPECT_EQ(system.vertical_datum, "EGM96 height") << files[0];
+    EXPECT_EQ(system.vertical_epsg, 5773);
+  } while (std::next_permutation(files.begin(), files.end()));
+  cut("other.tif", 20, "NAVD88 height", 5703);
+  for (const auto& both : {std::vector{"named.tif", "other.tif"}, std::vector{"other.tif", "named.tif"}}) {
+    EXPECT_THAT(why_refused({folder / both[0], folder / both[1]}), HasSubstr("its vertical datum is"));
+  }
+}
+
 TEST(MosaicSource, AChangedOrBrokenMemberIsAnErrorThatNamesIt) {
   const TemporaryFolder folder;
   const CutRaster raster = noise_raster(placed_spec(40, 10, SampleType::kInt16, Registration::kArea));
