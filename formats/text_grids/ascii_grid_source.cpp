@@ -372,7 +372,6 @@ class AsciiGridSource final : public FileSource {
         if (!any) refuse_short(row, column);
         if (column == 0) rows_->note(row, words_.offset_of(word));
         whole = check(word) && whole;
-        end_of_last_ = words_.offset_of(word) + word.size();
         any = words_.next(word);
       }
     }
@@ -389,9 +388,6 @@ class AsciiGridSource final : public FileSource {
           fmt::format("the header names no void value, but {} occurs; if it means a void, give `void_values` {}",
                       marker_, marker_),
           Warning::Kind::kUndeclaredNodata);
-    }
-    if (end_of_last_ == file_->size_bytes()) {
-      info_.warnings.push_back(loss("the file ends within its last line: its last number may be cut off"));
     }
   }
 
@@ -441,7 +437,6 @@ class AsciiGridSource final : public FileSource {
   bool is_grass_ = false;
   bool is_esri_ = false;
   std::optional<TextRows> rows_;
-  std::uint64_t end_of_last_ = 0;
   char decimal_ = 0;
   bool marked_ = false;  // a void value is named
   std::string marker_;   // void by custom, seen in the file

@@ -247,8 +247,6 @@ class SurferGridSource final : public PlainSource {
         if (!read_decimal(word, value)) refuse_word(word);
       }
     }
-    const bool cut = words_->offset_of(word) + word.size() == file_->size_bytes();
-    if (cut) info_.warnings.push_back(loss("the file ends within its last line: its last number may be cut off"));
     if (words_->next(word)) {
       corrupt(fmt::format("\"{}\" at byte {} comes after the {} x {} nodes that the header says", printable(word),
                           words_->offset_of(word), info_.width, info_.height));

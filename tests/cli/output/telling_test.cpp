@@ -19,17 +19,17 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 
-/// A raster that nothing is said about; one whose last number may be cut off (a loss); one that looks odd (a note).
+/// A raster that nothing is said about; one whose reference system is missed (a loss); one that looks odd (a note).
 struct Rasters {
   explicit Rasters(const TemporaryFolder& folder)
-      : plain(folder / "plain.asc"), cut(folder / "cut.asc"), odd(folder / "odd.asc"), out(folder / "out.isohf") {
+      : plain(folder / "plain.asc"), lossy(folder / "lossy.asc"), odd(folder / "odd.asc"), out(folder / "out.isohf") {
     write_text(plain, small_grid());
-    const std::string text = small_grid();
-    write_text(cut, text.substr(0, text.size() - 1));
+    write_text(lossy, small_grid());
+    write_text(folder / "lossy.prj", "LOCAL_CS[\"Mine\",UNIT[\"metre\",1]]");
     write_text(odd, small_grid(0, "-9999"));
   }
   std::string plain;
-  std::string cut;
+  std::string lossy;
   std::string odd;
   std::string out;
 };
@@ -170,10 +170,10 @@ TEST(JsonFiles, AreAllThatRestoreExportAndShadeWrote) {
 TEST(Strict, AWarningIsAnErrorAndNothingIsWritten) {
   const TemporaryFolder folder;
   const Rasters rasters(folder);
-  for (const std::string& input : {rasters.cut, rasters.odd}) {
+  for (const std::string& input : {rasters.lossy, rasters.odd}) {
     const json error = error_of({"convert", input, rasters.out, "--strict", "--json"}, 1);
     EXPECT_EQ(error.at("code"), "warning");
-    EXPECT_THAT(error.at("message").get<std::string>(), HasSubstr(input == rasters.cut ? "cut off" : "-9999"));
+    EXPECT_THAT(error.at("message").get<std::string>(), HasSubstr(input == rasters.lossy ? "it is ignored" : "-9999"));
     for (const char* ending : {"", ".part", ".part.journal"}) {
       EXPECT_FALSE(std::filesystem::exists(rasters.out + ending)) << ending;
     }
@@ -203,15 +203,15 @@ TEST(Strict, RefusesWhatWasClamped) {
 TEST(Quiet, TellsOfLostDataAndOfNothingElse) {
   const TemporaryFolder folder;
   const Rasters rasters(folder);
-  const RunResult lost = run_isohf({"convert", rasters.cut, rasters.out, "-q"});
+  const RunResult lost = run_isohf({"convert", rasters.lossy, rasters.out, "-q"});
   EXPECT_EQ(lost.exit_code, 0);
   EXPECT_EQ(lost.out, "");
   EXPECT_THAT(lost.err, HasSubstr("isohf: warning: "));
-  EXPECT_THAT(lost.err, HasSubstr("may be cut off"));
+  EXPECT_THAT(lost.err, HasSubstr("it is ignored"));
   const RunResult odd = run_isohf({"convert", rasters.odd, rasters.out, "-q", "--overwrite"});
   EXPECT_EQ(odd.exit_code, 0);
   EXPECT_EQ(odd.err, "");
-  EXPECT_THAT(run_isohf({"info", rasters.cut, "-q"}).err, HasSubstr("may be cut off"));
+  EXPECT_THAT(run_isohf({"info", rasters.lossy, "-q"}).err, HasSubstr("it is ignored"));
 }
 
 TEST(JsonProgress, LeavesNothingButJsonLinesOnStandardError) {
@@ -227,7 +227,7 @@ TEST(JsonProgress, LeavesNothingButJsonLinesOnStandardError) {
     return lines;
   };
   const std::vector<json> warned =
-      lines_of(run_isohf({"convert", rasters.cut, rasters.out, "--progress", "json", "-v"}));
+      lines_of(run_isohf({"convert", rasters.lossy, rasters.out, "--progress", "json", "-v"}));
   const auto of_kind = [](const std::vector<json>& lines, const char* member) {
     return std::count_if(lines.begin(), lines.end(), [&](const json& line) { return line.contains(member); });
   };

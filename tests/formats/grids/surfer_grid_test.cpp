@@ -137,7 +137,7 @@ TEST_F(SurferGrid, SaysWhatIsWrong) {
 
 TEST_F(SurferGrid, WarnsOfWhatIsOddAndReadsIt) {
   EXPECT_THAT(open(surfer6() + "more")->info().warnings, ElementsAre("4 bytes follow the grid"));
-  EXPECT_THAT(open(text_grid("1 2 3 4 5 6"))->info().warnings, ElementsAre(HasSubstr("may be cut off")));
+  EXPECT_TRUE(open(text_grid("1 2 3 4 5 6"))->info().warnings.empty());  // a text may end without a line break
   write_file(folder_ / "a.prj", R"(PROJCS["Here",GEOGCS["G",DATUM["D",SPHEROID["S",6378137,298]]],UNIT["metre",1]])");
   EXPECT_EQ(open(surfer7())->info().georeference.system.name, "Here");
 }
