@@ -47,8 +47,13 @@ std::unique_ptr<ScratchArchive> convert_for_viewing(const std::string& name, con
     understand_ground(source->info(), request.plan.ground);
     warnings = convert(*source, scratch->path(), request, job).warnings;
   } catch (const Error& error) {
-    if (!names_options(error.what())) throw;
-    throw Error(error.code(), fmt::format("{} ({})", error.what(), kWhoseOptions), error.parts());
+    const std::string why = error.what();
+    // What is done goes when the program ends: nothing resumes it.
+    if (const std::size_t kept = why.find(fmt::format("; {}.part keeps", scratch->path())); kept != std::string::npos) {
+      throw Error(error.code(), why.substr(0, kept) + "; TMPDIR names another folder, with more room", error.parts());
+    }
+    if (!names_options(why)) throw;
+    throw Error(error.code(), fmt::format("{} ({})", why, kWhoseOptions), error.parts());
   }
   if (options.common.quiet) return scratch;
   cli::print_warnings(warnings);
@@ -82,7 +87,7 @@ ScratchArchive::ScratchArchive() : path_(next_path()) {}
 
 ScratchArchive::~ScratchArchive() {
   std::error_code ignored;
-  for (const char* ending : {"", ".part"}) std::filesystem::remove(path_ + ending, ignored);
+  for (const char* ending : {"", ".part", ".part.journal"}) std::filesystem::remove(path_ + ending, ignored);
 }
 
 FileStamp stamp_of(const std::string& path) {

@@ -283,6 +283,24 @@ TEST_F(ViewProgramTest, ShowsARasterAndLeavesNothingBehind) {
   EXPECT_TRUE(std::filesystem::is_empty(folder));
 }
 
+TEST_F(ViewProgramTest, LeavesNothingInAFolderThatIsTooSmallForARaster) {
+  const std::string folder = path("scratch");
+  std::filesystem::create_directory(folder);
+  test::RunOptions full;
+  full.file_size_limit_bytes = 50000;
+  const Outcome outcome = test::run_program({"/bin/sh", "-c",
+                                             "TMPDIR=" + folder +
+                                                 " '" ISOHF_BIN_DIR "/isohf-view' " ISOHF_SOURCE_DIR
+                                                 "/testdata/coast_512x384_int16.tif --size 64x48 --screenshot " +
+                                                 path("none.png")},
+                                            full);
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  EXPECT_NE(outcome.err.find("TMPDIR names another folder"), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcome.err.find("resume"), std::string::npos) << outcome.err;
+  EXPECT_TRUE(std::filesystem::is_empty(folder));
+}
+
 TEST_F(ViewProgramTest, FilmsAFlight) {
   test::write_file(path("way.txt"), "0 100 200 600  480 0 100\n2 500 150 500  480 0 0\n");
   const std::string film =
