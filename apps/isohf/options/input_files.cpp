@@ -43,7 +43,7 @@ const std::set<std::string>& raster_extensions() {
 /// What of a folder counts.
 enum class Wanted { kRasters, kArchives, kBoth };
 
-/// By its name; of ZIP and tar archives by the names inside.
+/// By its name; of ZIP and tar archives by the names inside, of ENVI's .dat by the header beside.
 bool has_wanted_name(const fs::path& path, Wanted wanted) {
   std::string name = lower_case(path.filename().string());
   if (name.starts_with(".")) return false;
@@ -53,6 +53,7 @@ bool has_wanted_name(const fs::path& path, Wanted wanted) {
     if (name.ends_with(packed)) return is_archive_of_rasters(path.string());
   }
   if (name.ends_with(".gz")) name.resize(name.size() - 3);
+  if (name.ends_with(".dat")) return has_envi_header(path.string());
   return std::any_of(raster_extensions().begin(), raster_extensions().end(), [&](const std::string& extension) {
     return name.size() > extension.size() && name.ends_with(extension);
   });

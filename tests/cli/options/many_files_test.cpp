@@ -93,6 +93,17 @@ TEST_F(ManyFiles, FoldersPatternsAndListsAreTaken) {
   EXPECT_EQ(run_isohf({"verify", folder / "in", "--recursive", "--against", kRaster}).exit_code, 2);
 }
 
+TEST_F(ManyFiles, DataOfEnviAreRastersOfAFolderWhereTheirHeaderIsThere) {
+  std::filesystem::create_directory(folder / "envi");
+  write_file(folder / "envi/a.dat", std::string_view("abcd"));
+  write_file(folder / "envi/a.hdr", std::string_view("ENVI\nsamples = 2\nlines = 2\nbands = 1\ndata type = 1\n"));
+  write_file(folder / "envi/notes.dat", std::string_view("none"));
+  const RunResult result = run_isohf({"info", folder / "envi"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("a.dat: ENVI"));
+  EXPECT_THAT(result.out, testing::Not(HasSubstr("notes.dat")));
+}
+
 TEST_F(ManyFiles, AreDescribedOneAfterTheOther) {
   const RunResult text = run_isohf({"info", folder / "in", "--recursive"});
   EXPECT_EQ(text.exit_code, 0) << text.err;
