@@ -68,7 +68,7 @@ ordered_json document_of(const ConvertCommandOptions& options, const ConvertSumm
                          const std::optional<VoidCounts>& voids, const std::optional<ErrorEstimate>& expected) {
   const std::optional<AccuracyInfo> accuracy = accuracy_info(summary.metadata);
   const Measured measured = measure(summary);
-  const SizeBesideSource size(summary.metadata.source, summary.tile_bytes);
+  const SizeBesideSource size(summary.metadata, summary.tile_bytes);
   return {{"input", options.input},
           {"files", summary.metadata.source.mosaic ? summary.metadata.source.mosaic->files : 1},
           {"output", options.output},
@@ -118,7 +118,7 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
     say("map scale", "not known: " + why);
   }
   if (metadata.projection) say("projection", describe_projection(*metadata.projection));
-  say("size", describe_size(metadata.source, summary.tile_bytes));
+  say("size", describe_size(metadata, summary.tile_bytes));
   if (summary.residual_bytes > 0) {
     say("residuals",
         fmt::format("{}, {:.3f} bits a source sample", describe_bytes(summary.residual_bytes),

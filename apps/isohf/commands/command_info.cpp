@@ -122,7 +122,7 @@ ordered_json json_from_tiles(const ArchiveReader& archive) {
 
 void print_json(const ArchiveReader& archive, bool tiles, bool is_one_of_many) {
   const Derived derived = derive(archive);
-  const SizeBesideSource size(archive.metadata().source, derived.tile_bytes);
+  const SizeBesideSource size(archive.metadata(), derived.tile_bytes);
   ordered_json members = ordered_json::array();
   for (const MemberEntry& member : archive.loose_members()) {
     members.push_back({{"name", member.name},
@@ -297,7 +297,7 @@ std::string describe_archive(const ArchiveReader& archive) {
   say("reference", describe_crs(source));
   if (const auto place = source_place(metadata)) text += text_from(*place);
   say("filter", fmt::format("{}, acquisition {}", name_of(metadata.filter), name_of(metadata.acquisition)));
-  say("size", describe_size(source, derived.tile_bytes));
+  say("size", describe_size(metadata, derived.tile_bytes));
   if (const auto info = accuracy_info(metadata)) say("error", describe_accuracy(*info, unit));
   if (const auto info = texture_info(metadata)) {
     say("textures", fmt::format("{}; from {}, {} x {} pixels, placed by {}", describe_textures(*info, 0.0),

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <numbers>
 
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "isohf/restore/sample_grids.h"
 #include "options/describe.h"
 
 namespace isohf::cli {
@@ -22,25 +24,30 @@ std::uint64_t bytes_of_type(const std::string& sample_type) {
 
 }  // namespace
 
-SizeBesideSource::SizeBesideSource(const SourceRecord& source, std::uint64_t tile_bytes)
-    : source_samples(static_cast<std::uint64_t>(source.width) * static_cast<std::uint64_t>(source.height)),
-      source_bytes(source_samples * bytes_of_type(source.sample_type)) {
+SizeBesideSource::SizeBesideSource(const Metadata& metadata, std::uint64_t tile_bytes) {
+  const SourceRecord& source = metadata.source;
+  const auto area = [](const WorldBounds& ground) { return (ground.x1 - ground.x0) * (ground.z1 - ground.z0); };
+  const double share = area(ground_here(metadata)) / area(metadata.valid);
+  source_samples = static_cast<std::uint64_t>(source.width) * static_cast<std::uint64_t>(source.height);
+  is_part = share < 1.0;
+  if (is_part) source_samples = static_cast<std::uint64_t>(std::round(share * static_cast<double>(source_samples)));
+  source_bytes = source_samples * bytes_of_type(source.sample_type);
   if (source_samples > 0) {
     bits_per_source_sample = 8.0 * static_cast<double>(tile_bytes) / static_cast<double>(source_samples);
   }
   if (tile_bytes > 0) ratio_to_source = static_cast<double>(source_bytes) / static_cast<double>(tile_bytes);
 }
 
-std::string describe_size(const SourceRecord& source, std::uint64_t tile_bytes) {
-  const SizeBesideSource size(source, tile_bytes);
+std::string describe_size(const Metadata& metadata, std::uint64_t tile_bytes) {
+  const SizeBesideSource size(metadata, tile_bytes);
   const std::string text = fmt::format("elevations take {}, {:.3f} bits a source sample", describe_bytes(tile_bytes),
                                        size.bits_per_source_sample);
   if (size.ratio_to_source == 0.0) return text;
   const bool is_smaller = size.ratio_to_source >= 1.0;
-  return text + fmt::format(": {:.2f} times {} the source's {} of {}",
+  return text + fmt::format(": {:.2f} times {} the source's {} of {}{}",
                             is_smaller ? size.ratio_to_source : 1.0 / size.ratio_to_source,
                             is_smaller ? "smaller than" : "as large as", describe_bytes(size.source_bytes),
-                            source.sample_type);
+                            metadata.source.sample_type, size.is_part ? " there" : "");
 }
 
 double triangle_aspect(const TileGrid& grid) {

@@ -60,6 +60,29 @@ TEST_F(InfoCommand, SaysThatAPartIsOneAndOfWhichGround) {
   EXPECT_THAT(run_isohf({"info", folder / "a.isohf"}).out, testing::Not(HasSubstr("part ")));
 }
 
+TEST_F(InfoCommand, HoldsAPartAgainstTheSamplesOnItsGround) {
+  const auto bits = [&](const char* name) {
+    return json::parse(run_isohf({"info", folder / name, "--json"}).out).at("bits_per_source_sample").get<double>();
+  };
+  const std::int64_t columns = ArchiveReader(folder / "a.isohf").grid().tile_columns();
+  std::uint64_t samples = 0;
+  for (std::int64_t column = 0; column < columns; ++column) {
+    const std::string part = std::to_string(column) + ":" + std::to_string(column + 1);
+    const std::string rows = std::to_string(ArchiveReader(folder / "a.isohf").grid().tile_rows());
+    ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", folder / "p.isohf", "--tiles", part + ",0:" + rows, "-q",
+                         "--overwrite"})
+                  .exit_code,
+              0);
+    samples +=
+        json::parse(run_isohf({"info", folder / "p.isohf", "--json"}).out).at("source_samples").get<std::uint64_t>();
+    if (column == 0) {
+      EXPECT_GT(bits("p.isohf"), bits("a.isohf")) << "where all the elevations are";
+      EXPECT_THAT(run_isohf({"info", folder / "p.isohf"}).out, HasSubstr(" of float32 there\n"));
+    }
+  }
+  EXPECT_NEAR(static_cast<double>(samples), 20000.0, static_cast<double>(columns));
+}
+
 TEST_F(InfoCommand, TilesAreListedOneALine) {
   const json info = json::parse(run_isohf({"info", folder / "a.isohf", "--json", "--tiles"}).out);
   const std::size_t count = info.at("grid").at("tiles").get<std::size_t>();
