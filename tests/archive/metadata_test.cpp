@@ -60,6 +60,19 @@ TEST(Metadata, ComesBackAsItWas) {
   EXPECT_EQ(back.extensions[0], metadata.extensions[0]);
 }
 
+TEST(Metadata, ABoundOnTheRoundingIsHalfAStepOrMore) {
+  Metadata metadata = full();
+  metadata.rounding = 0.07;  // of steps of 0.1
+  const std::string json = format_metadata(metadata);
+  EXPECT_EQ(parse_metadata(json).rounding, 0.07);
+  EXPECT_EQ(parse_metadata(format_metadata(full())).rounding, std::nullopt);
+  for (const char* const wrong : {"0.049", "0", "-1", "\"much\""}) {
+    EXPECT_THROW((void)parse_metadata(replaced(json, "\"rounding\": 0.07", std::string("\"rounding\": ") + wrong)),
+                 Error)
+        << wrong;
+  }
+}
+
 TEST(Metadata, TellAUnitByTheSpacingsInVersion1Alone) {
   Metadata metadata = full();
   metadata.source.crs_unit = "metre";
