@@ -537,7 +537,7 @@ TEST_F(Idrisi, ParametersBesideNameTheReferenceSystem) {
   EXPECT_THAT(system.wkt, HasSubstr("Lambert_Azimuthal_Equal_Area"));
   EXPECT_THAT(system.wkt, HasSubstr(R"(PARAMETER["false_easting",4321000],PARAMETER["false_northing",3210000])"));
   EXPECT_EQ(system.inverse_flattening, 298.257222101);
-  for (const auto& [name, why] : {std::pair("spc83ny4", "a system without parameters"), {"laea", "an unknown map"}}) {
+  for (const auto& [name, why] : {std::pair("spc83xx4", "a system without parameters"), {"laea", "an unknown map"}}) {
     write("a.rdc", header + name + "\n");
     write("LAEA.ref", parameters("Hammer Aitoff"));
     ASSERT_EQ(open("a.rst")->info().warnings.size(), 1U) << why;
