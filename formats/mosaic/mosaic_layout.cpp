@@ -22,8 +22,10 @@ namespace {
 constexpr double kSameResolution = 1e-3;
 /// The same across reference systems: maps of neighbouring zones differ in scale.
 constexpr double kAboutAsFine = 1.05;
-/// Rounding that moves samples by more than this is worth a word.
+/// Rounding that moves samples by more than this is worth a word, and from the second on it is a place that is lost:
+/// texts of six digits round by less.
 constexpr double kWorthAWord = 1e-3;
+constexpr double kPlaceLost = 1e-2;
 /// Sides of more samples would overflow byte counts; far beyond what memory bounds.
 constexpr double kMostSamples = 1e9;
 /// Edges of coarser members that fall on samples are computed and may miss them by a little.
@@ -443,6 +445,7 @@ void place_members(std::vector<PlacedMember> members, MosaicPlan& plan) {
     plan.info.warnings.push_back(fmt::format(
         "places of files are rounded: they lie up to {:.2g} of a sample off their common grid and are put on it",
         worst));
+    if (worst >= kPlaceLost) plan.info.warnings.back().kind = Warning::Kind::kLoss;
   }
   // Coarsest first; of two of one area, the one with the wider columns.
   std::stable_sort(plan.layers.begin(), plan.layers.end(), [](const MosaicLayer& a, const MosaicLayer& b) {

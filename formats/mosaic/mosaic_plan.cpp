@@ -254,9 +254,9 @@ class Survey {
     if (!is_known(place) || !is_known(systems_.front())) {
       refuse(path, why +
                        "; not both of the reference systems are known, so that they cannot be joined: `crs` says "
-                       "what all are in, or leave it out");
+                       "what all are in, or leave this file out");
     }
-    if (!joins_) refuse(path, why + "; `projection` joins them on one map (auto, EPSG:n, ...), or leave it out");
+    if (!joins_) refuse(path, why + "; `projection` joins them on one map (auto, EPSG:n, ...), or leave this file out");
     systems_.push_back(place);
     system_of_.push_back(systems_.size() - 1);
   }

@@ -341,8 +341,12 @@ int run(const VerifyCommandOptions& options, const Arguments& arguments) {
   }
   const std::vector<std::string> files = list_files(options.archives, options.against.recursive, true);
   if (files.size() > 1 && !options.against.names.empty()) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("verify: --against compares one archive with its input, {} are given", files.size()));
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("verify: --against compares one archive with its input, {} archives are given; every file of "
+                    "a mosaic wants an --against of its own (--against a.tif --against b.tif), or one "
+                    "pattern in quotes takes them all (--against \"*.tif\")",
+                    files.size()));
   }
   return for_each_file("verify", files, options.common, [&](const std::string& file) {
     VerifyCommandOptions one = options;

@@ -45,6 +45,12 @@ TEST_F(VerifyCommand, WholeArchivePasses) {
   EXPECT_TRUE(report.at("checks").at("findings").empty());
 }
 
+TEST_F(VerifyCommand, FilesAfterTheFirstInputWantAnAgainstOfTheirOwn) {
+  const RunResult result = run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", folder / "a.tif"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--against a.tif --against b.tif"));
+}
+
 TEST_F(VerifyCommand, ComparesWithTheSource) {
   const RunResult text = run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif"});
   EXPECT_EQ(text.exit_code, 0) << text.out << text.err;

@@ -238,6 +238,7 @@ TEST(MosaicSource, OriginsRoundedInTheFileAreSnappedAndSaid) {
   raster.cut(folder / "b.tif", {20, 0, 20, 10});
   const auto mosaic = open_mosaic({folder / "a.tif", folder / "b.tif"});
   EXPECT_THAT(mosaic->info().warnings, ::testing::ElementsAre(HasSubstr("0.02 of a sample off")));
+  EXPECT_EQ(mosaic->info().warnings[0].kind, Warning::Kind::kLoss);
   EXPECT_TRUE(read_whole(*mosaic) == raster.samples);
   raster.spec.georeference->origin_x += 0.2 * 30.0;
   std::filesystem::remove(folder / "b.tif");
@@ -245,6 +246,18 @@ TEST(MosaicSource, OriginsRoundedInTheFileAreSnappedAndSaid) {
   const std::string why = why_refused({folder / "a.tif", folder / "b.tif"});
   EXPECT_THAT(why, HasSubstr("b.tif: lies 0.22 of a sample off the grid of the other files of its resolution in x"));
   EXPECT_THAT(why, HasSubstr("resample"));
+}
+
+TEST(MosaicSource, AThousandthOfASampleIsRoundingAndNoLoss) {
+  const TemporaryFolder folder;
+  CutRaster raster = raster_of<float>(placed_spec(40, 10, SampleType::kFloat32, Registration::kArea),
+                                      [](auto c, auto) { return static_cast<double>(c); });
+  raster.cut(folder / "a.tif", {0, 0, 20, 10});
+  raster.spec.georeference->origin_x += 0.005 * 30.0;
+  raster.cut(folder / "b.tif", {20, 0, 20, 10});
+  const std::vector<Warning> warnings = open_mosaic({folder / "a.tif", folder / "b.tif"})->info().warnings;
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_EQ(warnings[0].kind, Warning::Kind::kNote);
 }
 
 TEST(MosaicSource, FilesThatDisagreeAreRefusedByName) {
