@@ -15,7 +15,7 @@ struct UnitRow {
   int epsg = 0;
   const char* name = "";
   double metres = 1.0;
-  std::array<std::string_view, 6> spellings = {};  // lower case
+  std::array<std::string_view, 8> spellings = {};  // lower case
 };
 
 // EPSG dataset, table of units of measure; the US survey foot is 1200/3937 m by definition.
@@ -25,7 +25,7 @@ constexpr std::array<UnitRow, 10> kUnits = {{
     {9003,
      "US survey foot",
      1200.0 / 3937.0,
-     {"ftus", "us-ft", "us_ft", "us survey foot", "us survey feet", "foot_us"}},
+     {"ftus", "us-ft", "us_ft", "us survey foot", "us survey feet", "foot_us", "us_survey_foot", "us_survey_feet"}},
     {9036, "kilometre", 1000.0, {"km", "kilometre", "kilometer", "kilometres", "kilometers", ""}},
     {9030, "nautical mile", 1852.0, {"nm", "nautical mile", "nautical miles", "", "", ""}},
     {9093, "statute mile", 1609.344, {"mi", "statute mile", "mile", "miles", "", ""}},

@@ -37,6 +37,7 @@ class CfReader {
 
   CfRaster read(const OpenOptions& options) {
     CfRaster raster;
+    is_system_given_ = !options.reference_system.empty();
     raster.variable = &choose(options);
     const Variable& variable = *raster.variable;
     info_.sample_type = *variable.sample_type();
@@ -188,12 +189,20 @@ class CfReader {
   }
 
   void read_place(const Variable& variable, const Variable& rows, const Variable& columns, CfRaster& raster) {
-    const auto is_degrees = [](const Variable& of) { return of.text("units").starts_with("degree"); };
-    const auto y = axis_of(rows, static_cast<std::uint64_t>(info_.height), false);
-    const auto x = axis_of(columns, static_cast<std::uint64_t>(info_.width), is_degrees(columns));
+    const std::string unit = trimmed(columns.text("units"));
+    // Those of a geostationary view are angles as well, but no longitudes.
+    const bool is_radians =
+        (unit == "radian" || unit == "radians" || unit == "rad") &&
+        (columns.text("standard_name") == "longitude" || lower_case(columns.name).starts_with("lon"));
+    const bool is_degrees = unit.starts_with("degree") || is_radians;
+    auto y = axis_of(rows, static_cast<std::uint64_t>(info_.height), false);
+    auto x = axis_of(columns, static_cast<std::uint64_t>(info_.width), is_degrees && !is_radians);
     if (!x || !y) {
       info_.warnings.push_back(loss("its coordinates are not evenly spaced: where it lies is left out"));
       return;
+    }
+    if (is_radians) {
+      for (double* value : {&x->first, &x->step, &y->first, &y->step}) *value *= 180.0 / std::numbers::pi;
     }
     if (x->step < 0.0) refuse(ErrorCode::kUnsupported, "its columns run from East to West (gdalwarp turns it)");
     const auto offset = file_.attributes.find("node_offset");  // GMT: 1 for pixels
@@ -207,7 +216,6 @@ class CfReader {
     place.has_origin = true;
     place.origin_x = x->first;
     place.origin_y = raster.from_south ? y->first + static_cast<double>(info_.height - 1) * y->step : y->first;
-    const std::string unit = columns.text("units");
     const std::string mapping = variable.text("grid_mapping");
     const Variable* const system = mapping.empty() ? nullptr : file_.variable(mapping);
     std::string wkt = system == nullptr ? "" : system->text("crs_wkt");
@@ -224,7 +232,7 @@ class CfReader {
       read_system_text(map, info_.path, info_);
     } else if (!kind.empty() && kind != "latitude_longitude" && !length) {
       leave_out_place(fmt::format("its grid mapping {} comes without crs_wkt", printable(kind)));
-    } else if (is_degrees(columns)) {
+    } else if (is_degrees) {
       place.unit = HorizontalUnit::kDegree;
       const std::string figure = system == nullptr ? "" : figure_of(*system);
       if (figure.empty()) {
@@ -238,6 +246,11 @@ class CfReader {
       if (kind.empty()) return;
       info_.warnings.push_back(loss(
           fmt::format("its grid mapping {} comes without crs_wkt: the reference system is left out", printable(kind))));
+    } else if (!unit.empty() && unit != "1" && unit != "user_x_unit" && !is_system_given_) {  // the latter of older GMT
+      info_.warnings.push_back(
+          loss(fmt::format("its coordinates are in \"{}\", which is no unit that isohf knows: they are kept as numbers "
+                           "(`reference_system` says what they are)",
+                           printable(unit))));
     }
   }
 
@@ -373,7 +386,7 @@ class CfReader {
     if (lower_case(variable.text("positive")) == "down" ||
         variable.text("standard_name").starts_with("sea_floor_depth")) {
       info_.z_scale = -info_.z_scale;
-      info_.z_offset = -info_.z_offset;
+      info_.z_offset = 0.0 - info_.z_offset;  // never -0
       info_.warnings.emplace_back("its numbers are depths, positive down: elevations are their negatives");
     }
     const auto unit = linear_unit(variable.text("units"));
@@ -384,6 +397,7 @@ class CfReader {
 
   CfFile& file_;
   SourceInfo& info_;
+  bool is_system_given_ = false;  ///< by the user
 };
 
 }  // namespace

@@ -19,6 +19,7 @@
 namespace isohf::test {
 namespace {
 
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -268,6 +269,44 @@ TEST_F(Netcdf, DepthsAreNegativeElevations) {
     EXPECT_EQ(source->info().z_offset, -10.0) << key;
     EXPECT_THAT(source->info().warnings, ElementsAre(HasSubstr("depths, positive down")));
   }
+}
+
+TEST_F(Netcdf, DepthsWithoutAnOffsetHaveNone) {
+  NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
+  write("a.nc", file.variable("z", {0, 1}, 3, std::string(8, '\1'), {{"positive", "down"}}).bytes());
+  EXPECT_FALSE(std::signbit(open("a.nc")->info().z_offset));
+}
+
+TEST_F(Netcdf, UnitsOfCoordinatesAreReadOrTold) {
+  const auto with = [&](const std::string& axis, const std::string& unit) {
+    NetcdfBytes file;
+    file.dimension("y", 2).dimension(axis, 2);
+    file.variable(axis, {1}, 6, stored<double>({0.25, 0.5}, true), {{"units", unit}});
+    file.variable("y", {0}, 6, stored<double>({0.75, 0.5}, true), {{"units", unit}});
+    file.variable("z", {0, 1}, 3, std::string(8, '\1'), {});
+    write("a.nc", file.bytes());
+    return open("a.nc");
+  };
+  const auto feet = with("x", "US_survey_foot");
+  EXPECT_EQ(feet->info().georeference.unit, HorizontalUnit::kMetre);
+  EXPECT_EQ(feet->info().georeference.metres_per_unit, 1200.0 / 3937.0);
+  EXPECT_THAT(feet->info().warnings, ElementsAre(HasSubstr("its coordinates are in feet")));
+  const auto furlongs = with("x", "furlong");
+  ASSERT_EQ(furlongs->info().warnings.size(), 1U);
+  EXPECT_EQ(furlongs->info().warnings[0].kind, Warning::Kind::kLoss);
+  EXPECT_THAT(furlongs->info().warnings[0], HasSubstr("\"furlong\", which is no unit that isohf knows"));
+#ifdef ISOHF_WITH_PROJ
+  set_module_folder(ISOHF_BIN_DIR);
+  OpenOptions options;
+  options.reference_system = "EPSG:2263";
+  EXPECT_THAT(open_raster(folder_ / "a.nc", options)->info().warnings, ::testing::Not(Contains(HasSubstr("furlong"))));
+#endif
+  EXPECT_THAT(with("x", "radian")->info().warnings, ElementsAre(HasSubstr("\"radian\"")));  // of a view from space
+  const auto radians = with("longitude", "radian");
+  EXPECT_EQ(radians->info().georeference.unit, HorizontalUnit::kDegree);
+  EXPECT_NEAR(radians->info().georeference.origin_x, 14.3239448782706, 1e-12);
+  EXPECT_NEAR(radians->info().georeference.spacing_y, 14.3239448782706, 1e-12);
+  EXPECT_THAT(radians->info().warnings, ElementsAre());
 }
 
 TEST_F(Netcdf, DegreesOfARotatedGridAreNone) {
