@@ -3,14 +3,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <string>
-#include <type_traits>
 
-#include "formats/files/text.h"
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -110,35 +106,6 @@ void apply_open_options(SourceInfo& info, const OpenOptions& options) {
   if (options.z_scale) override_scale(info, *options.z_scale);
   if (options.z_offset) info.z_offset = *options.z_offset;
   if (options.spacing) override_spacing(info, *options.spacing);
-}
-
-std::int64_t choose_band(SourceInfo& info, const OpenOptions& options, std::int64_t bands,
-                         const std::vector<std::string>& names) {
-  std::int64_t band = 0;
-  const auto named = std::find(names.begin(), names.end(), options.channel);
-  const auto called = [&](std::int64_t i) {
-    const auto at = static_cast<std::size_t>(i);
-    return at < names.size() && !names[at].empty() ? printable(names[at]) : fmt::format("{}", i);
-  };
-  if (!options.channel.empty() && named != names.end() && named - names.begin() < bands) {
-    band = named - names.begin();
-  } else if (!options.channel.empty()) {
-    const char* const end = options.channel.data() + options.channel.size();
-    const auto [at, error] = std::from_chars(options.channel.data(), end, band);
-    if (error != std::errc{} || at != end || band < 0 || band >= bands) {
-      std::string there = bands == 1 ? "is 0 alone" : fmt::format("are 0 to {}", bands - 1);
-      constexpr std::size_t kLongestList = 200;
-      for (std::size_t i = 0; i < names.size() && there.size() < kLongestList; ++i) {
-        if (!names[i].empty()) there += fmt::format("{} {}", i == 0 ? ":" : ",", printable(names[i]));
-      }
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("{}: there is no channel \"{}\"; there {}", info.path, options.channel, there));
-    }
-  } else if (bands > 1) {
-    info.warnings.push_back(fmt::format("there are {} bands; channel {} is read", bands, called(0)));
-  }
-  if (bands > 1) info.channel = called(band);
-  return band;
 }
 
 }  // namespace isohf

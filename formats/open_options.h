@@ -31,10 +31,4 @@ void bound_undeclared_voids(SourceInfo& info);
 /// a scale of 0, a void value that the sample type cannot hold. `options.channel` is the reader's own business.
 void apply_open_options(SourceInfo& info, const OpenOptions& options);
 
-/// The band that `options.channel` picks among `bands`, by one of `names`, which may be fewer and empty, or by its number
-/// from 0; the first where it says nothing, with a warning when there are others. Fills info.channel.
-/// Throws Error{kInvalidArgument} where there is no such band.
-[[nodiscard]] std::int64_t choose_band(SourceInfo& info, const OpenOptions& options, std::int64_t bands,
-                                       const std::vector<std::string>& names = {});
-
 }  // namespace isohf

@@ -150,10 +150,10 @@ void DescribedSource::require_samples() const {
   }
 }
 
-void DescribedSource::finish(const OpenOptions& options) {
+void DescribedSource::finish(const OpenOptions& options, int band) {
   require_samples();
+  read_files_beside(info_, band);
   bound_undeclared_voids(info_);
-  if (!has_reference_system(info_.georeference)) read_prj_beside(info_);
   info_.block_width = info_.width;
   // The samples of a column follow each other: some rows at once cost what one does.
   constexpr std::int64_t kRowsAtOnce = 64;

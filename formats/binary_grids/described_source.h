@@ -69,8 +69,9 @@ class DescribedSource : public PlainSource {
   void leave_out_system(const char* what, const std::string& name);
   /// Throws Error{kCorrupt} where the file has fewer bytes than the description says.
   void require_samples() const;
-  /// Requires the samples, and takes what lies beside it and what the user says.
-  void finish(const OpenOptions& options);
+  /// Requires the samples, and takes what lies beside it, of `band` as read_auxiliary_metadata has it, and what the user
+  /// says.
+  void finish(const OpenOptions& options, int band = 1);
 
   std::string header_;  ///< for messages
 

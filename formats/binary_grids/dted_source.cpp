@@ -1,3 +1,4 @@
+#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <fmt/format.h>
@@ -13,6 +14,7 @@
 
 #include "formats/files/file_source.h"
 #include "formats/files/text.h"
+#include "formats/georeference/files_beside.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"
@@ -52,6 +54,7 @@ class DtedSource final : public FileSource {
     check_size();
     checked_.assign(static_cast<std::size_t>(info_.width), false);
     ignores_checksums_ = options.ignore_checksums;
+    read_auxiliary_metadata(info_, 1);
     apply_open_options(info_, options);
   }
 

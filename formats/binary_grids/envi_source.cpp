@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "formats/binary_grids/described_source.h"
+#include "formats/files/bands.h"
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/units.h"
-#include "formats/open_options.h"
 #include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -36,10 +36,12 @@ class EnviSource final : public DescribedSource {
     layout_.offset_bytes = static_cast<std::uint64_t>(count(number(words, "header offset", 0.0), "header offset", 0.0));
     layout_.take_band(info_, order_in(words), band, bands, header);
     read_place(words);
-    read_scale(words, static_cast<std::size_t>(band));
-    if (const auto value = words.find("data ignore value"); value != words.end())
+    const int number_of_band = static_cast<int>(band) + 1;
+    read_auxiliary_metadata(info_, number_of_band);  // which goes before the header, as for GDAL
+    if (info_.z_scale == 1.0 && info_.z_offset == 0.0) read_scale(words, static_cast<std::size_t>(band));
+    if (const auto value = words.find("data ignore value"); value != words.end() && info_.void_values.empty())
       set_void(number(value->second, "data ignore value"));
-    finish(options);
+    finish(options, number_of_band);
   }
 
  private:

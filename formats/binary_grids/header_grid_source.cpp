@@ -1,3 +1,4 @@
+#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <fmt/core.h>
@@ -125,11 +126,11 @@ class HeaderGridSource final : public PlainSource {
     header.read_place(info_);
     read_world_file();
     header.read_void(info_);
+    read_files_beside(info_, 1);
     if (is_floating(info_.sample_type) && info_.void_values.empty()) {
       info_.valid_min = -kBeyondAnyHeight;
       info_.valid_max = kBeyondAnyHeight;
     }
-    read_prj_beside(info_);
     info_.block_width = info_.width;
     apply_open_options(info_, options);
   }

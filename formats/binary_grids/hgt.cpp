@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "formats/binary_grids/plain_samples.h"
+#include "formats/files/bands.h"
 #include "formats/files/text.h"
+#include "formats/georeference/files_beside.h"
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
@@ -83,6 +85,7 @@ class HgtSource final : public PlainSource {
       file_.emplace(path, options.unpacked_bytes);
     }
     describe(name, file_->size_bytes(), options);
+    read_auxiliary_metadata(info_, 1);
     apply_open_options(info_, options);
   }
 

@@ -16,6 +16,7 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/files/bands.h"
 #include "formats/files/block_cache.h"
 #include "formats/files/file_source.h"
 #include "formats/files/text.h"
@@ -201,8 +202,8 @@ class ImagineSource final : public FileSource {
     for (const Node& layer : layers) names.push_back(layer.name);
     const auto band = choose_band(info_, options, static_cast<std::int64_t>(layers.size()), names);
     read_layer(layers[static_cast<std::size_t>(band)], options);
+    read_files_beside(info_, static_cast<int>(band) + 1);
     bound_undeclared_voids(info_);
-    if (!has_reference_system(info_.georeference)) read_prj_beside(info_);
     apply_open_options(info_, options);
     limit_buffers(kMostKeptBytes);
   }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "formats/binary_grids/described_source.h"
+#include "formats/files/bands.h"
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/map_wkt.h"
@@ -203,7 +204,9 @@ class RoiPacSource final : public DescribedSource {
       place_by_corner(number(words, "x_first"), number(words, "y_first"), number(words, "x_step"),
                       -number(words, "y_step"));
     }
-    set_scale(number(words, "z_scale", 1.0), number(words, "z_offset", 0.0), "Z_SCALE");
+    read_auxiliary_metadata(info_, 1);  // which goes before the header, as for GDAL
+    if (info_.z_scale == 1.0 && info_.z_offset == 0.0)
+      set_scale(number(words, "z_scale", 1.0), number(words, "z_offset", 0.0), "Z_SCALE");
     Georeference& place = info_.georeference;
     const std::string projection = word_in(words, "projection");
     int zone = 0;
@@ -318,7 +321,7 @@ class VicarSource final : public DescribedSource {
                       choose_band(info_, options, bands), bands, header_, static_cast<std::uint64_t>(prefix));
     place_by_map(text);
     if (!info_.georeference.has_origin) read_place_beside(info_, bands == 1 ? 1 : 0);
-    finish(options);
+    finish(options, 0);
   }
 
  private:

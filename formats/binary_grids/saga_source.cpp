@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "formats/binary_grids/described_source.h"
+#include "formats/files/bands.h"
 #include "formats/files/text.h"
-#include "formats/open_options.h"
 #include "formats/readers.h"
 #include "isohf/base/sample.h"
 #include "isohf/error.h"

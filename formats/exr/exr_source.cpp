@@ -1,3 +1,4 @@
+#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <OpenEXR/Iex.h>
@@ -40,9 +41,7 @@
 namespace isohf {
 namespace {
 
-/// Words for elevations, anywhere in the name of a channel or its layer, in any case.
-constexpr std::array kHeightWords = {"height", "elevation", "altitude", "dem"};
-/// Then channels called so, in any case; those of layers of normals and the like are something else.
+/// After kHeightWords, which may be the name of a channel or its layer in any case, channels called so, in any case; those of layers of normals and the like are something else.
 constexpr std::array kPreferredChannels = {"y", "z", "depth", "r"};
 constexpr std::array kOtherLayers = {"n", "normal", "normals", "uv", "st", "motion", "velocity", "tangent"};
 /// The order in which OpenImageIO, and so oiiotool, lists the channels of a layer; others follow by name.

@@ -63,8 +63,8 @@ std::vector<std::string> world_extensions(const std::string& raster_path) {
 
 constexpr std::size_t kChunk = 65536;
 
-/// The texts of interest, by their place in the document: "SRS", "GeoTransform", "AREA_OR_POINT", and "1/NoDataValue"
-/// and so on for a band.
+/// The texts of interest, by their place in the document: "SRS", "GeoTransform", "AREA_OR_POINT", and "1/NoDataValue",
+/// "1/PIXELTYPE" and so on for a band.
 using Texts = std::map<std::string, std::string, std::less<>>;
 
 /// What expat calls while it reads.
@@ -87,7 +87,10 @@ class Document {
     } else if (depth_ == 3 && in_metadata_ && element == "MDI") {
       if (attribute("key") == "AREA_OR_POINT") key_ = "AREA_OR_POINT";
     } else if (depth_ == 3 && !band_.empty()) {
+      is_structure_ = element == "Metadata" && attribute("domain") == "IMAGE_STRUCTURE";
       key_ = fmt::format("{}/{}", band_, element);
+    } else if (depth_ == 4 && !band_.empty() && is_structure_ && attribute("key") == "PIXELTYPE") {
+      key_ = band_ + "/PIXELTYPE";
     }
   }
   void add(std::string_view text) {
@@ -103,6 +106,7 @@ class Document {
  private:
   int depth_ = 0;
   bool in_metadata_ = false;
+  bool is_structure_ = false;  ///< the band's metadata that is open is of how its samples are stored
   std::string band_;
   std::string key_;  ///< of the element that is open and of interest
   std::string text_;
@@ -160,9 +164,9 @@ void place_by_transform(const std::string& path, const std::string& text, Georef
   const auto [x0, dx, turn_x, y0, turn_y, dy] = six_numbers(path, text);
   if (turn_x != 0.0 || turn_y != 0.0 || !(dx > 0.0) || !(dy < 0.0)) {
     throw Error(ErrorCode::kUnsupported,
-                fmt::format("{}: GeoTransform is \"{}\": isohf reads pictures whose columns run from West to East and "
-                            "whose rows run from North to South",
-                            path, printable(text)));
+                fmt::format("{}: GeoTransform has a dx of {}, a dy of {} and rotations of {} and {}: columns must run "
+                            "from West to East (dx > 0) and rows from North to South (dy < 0); gdalwarp turns it",
+                            path, dx, dy, turn_x, turn_y));
   }
   place.has_origin = true;
   place.spacing_x = dx;
@@ -236,50 +240,99 @@ std::string file_beside(const std::string& beside, const std::string& name) {
   return found.empty() ? found : (folder / found).string();
 }
 
-void read_auxiliary_metadata(SourceInfo& info, int band) {
-  const std::string path = without_gzip(info.path) + ".aux.xml";
-  if (!is_file(path)) return;
-  const Texts texts = read(path);
-  const auto text = [&](const std::string& key) {
-    const auto found = texts.find(key);
-    return found == texts.end() ? std::string() : found->second;
-  };
-  Georeference& place = info.georeference;
-  if (const std::string transform = text("GeoTransform"); !place.has_origin && !transform.empty()) {
-    place_by_transform(path, transform, place);
+namespace {
+
+/// What GDAL's file beside a raster says.
+class AuxiliaryFile {
+ public:
+  explicit AuxiliaryFile(const std::string& raster_path) : path_(without_gzip(raster_path) + ".aux.xml") {
+    if (is_file(path_)) texts_ = read(path_);
   }
-  if (const std::string system = text("SRS");
-      place.unit == HorizontalUnit::kUnknown && !has_reference_system(place) && !system.empty()) {
-    read_system_text(system, path, info);  // GDAL takes a code as well
+
+  /// Empty where it says nothing.
+  [[nodiscard]] std::string text(const std::string& key) const {
+    const auto found = texts_.find(key);
+    return found == texts_.end() ? std::string() : found->second;
   }
-  if (place.registration == Registration::kUnknown) {
+
+  void place(SourceInfo& info) const {
+    Georeference& place = info.georeference;
+    if (const std::string transform = text("GeoTransform"); !place.has_origin && !transform.empty()) {
+      place_by_transform(path_, transform, place);
+    }
+    if (const std::string system = text("SRS");
+        place.unit == HorizontalUnit::kUnknown && !has_reference_system(place) && !system.empty()) {
+      read_system_text(system, path_, info);  // GDAL takes a code as well
+    }
+    if (place.registration != Registration::kUnknown) return;
     const std::string kind = text("AREA_OR_POINT");
     if (kind == "Area") place.registration = Registration::kArea;
     if (kind == "Point") place.registration = Registration::kPoint;
   }
-  if (band == 0) return;
-  const auto of_band = [&](const char* element) { return text(fmt::format("{}/{}", band, element)); };
-  if (info.void_values.empty()) read_gdal_nodata(of_band("NoDataValue"), info);
-  const auto item = [&](const char* role, const char* element, bool known) {
-    if (const std::string value = of_band(element); !known && !value.empty()) read_gdal_item(role, value, info);
-  };
-  item("unittype", "UnitType", !info.vertical_unit.empty());
-  const bool scaled = info.z_scale != 1.0 || info.z_offset != 0.0;
-  item("scale", "Scale", scaled);
-  item("offset", "Offset", scaled);
-}
 
-void read_prj_beside(SourceInfo& info, int band) {
+  /// What a band's samples are and mean. What the raster says otherwise itself stays, with a note.
+  void describe(SourceInfo& info, int band) const {
+    const auto of_band = [&](const char* element) { return text(fmt::format("{}/{}", band, element)); };
+    if (info.sample_type == SampleType::kUint8 && of_band("PIXELTYPE") == "SIGNEDBYTE") {
+      info.sample_type = SampleType::kInt8;
+      for (double& value : info.void_values) value -= value > 127.0 ? 256.0 : 0.0;
+    }
+    SourceInfo said;
+    said.sample_type = info.sample_type;
+    read_gdal_nodata(of_band("NoDataValue"), said);
+    const auto item = [&](const char* role, const char* element) {
+      if (const std::string value = trimmed(of_band(element)); !value.empty()) read_gdal_item(role, value, said);
+    };
+    item("unittype", "UnitType");
+    item("scale", "Scale");
+    item("offset", "Offset");
+    info.warnings.insert(info.warnings.end(), said.warnings.begin(), said.warnings.end());
+    const auto note = [&](const std::string& theirs, const std::string& ours) {
+      info.warnings.push_back(fmt::format("{} gives {}; followed is the raster itself, which gives {}",
+                                          std::filesystem::path(path_).filename().string(), theirs, ours));
+    };
+    if (info.void_values.empty()) {
+      info.void_values = said.void_values;
+    } else if (!said.void_values.empty() && !std::isnan(said.void_values.front()) &&
+               std::ranges::find_first_of(info.void_values, said.void_values) == info.void_values.end()) {
+      note(fmt::format("the void value {}", said.void_values.front()),
+           fmt::format("{} (`void_values` {} takes the other)", info.void_values.front(), said.void_values.front()));
+    }
+    const auto scale_of = [](const SourceInfo& of) { return fmt::format("sample * {} + {}", of.z_scale, of.z_offset); };
+    const auto is_scaled = [](const SourceInfo& of) { return of.z_scale != 1.0 || of.z_offset != 0.0; };
+    if (!is_scaled(info)) {
+      info.z_scale = said.z_scale;
+      info.z_offset = said.z_offset;
+    } else if (is_scaled(said) && scale_of(said) != scale_of(info)) {
+      note("elevations as " + scale_of(said), scale_of(info));
+    }
+    if (info.vertical_unit.empty()) {
+      info.vertical_unit = said.vertical_unit;
+      info.metres_per_vertical_unit = said.metres_per_vertical_unit;
+    } else if (!said.vertical_unit.empty() && said.vertical_unit != info.vertical_unit) {
+      note("the unit " + printable(said.vertical_unit), info.vertical_unit);
+    }
+  }
+
+ private:
+  std::string path_;
+  Texts texts_;
+};
+
+/// Whether the .prj beside says where the raster lies.
+bool take_prj(SourceInfo& info) {
   const std::string text = prj_beside(info.path);
+  if (text.empty()) return false;
   try {
-    if (!text.empty() && read_prj(text, info)) return;
+    if (read_prj(text, info)) return true;
   } catch (const Error& error) {
     throw error.within(info.path);
   }
-  if (!text.empty()) {
-    info.warnings.push_back(loss("the .prj beside the file is not the WKT of a map's reference system; it is ignored"));
-  }
-  read_auxiliary_metadata(info, band);
+  info.warnings.push_back(loss("the .prj beside the file is not the WKT of a map's reference system; it is ignored"));
+  return false;
+}
+
+void suspect_degrees(SourceInfo& info) {
   const Georeference& place = info.georeference;
   if (place.unit == HorizontalUnit::kUnknown && place.has_origin && place.spacing_x < kFinestAsMetres &&
       place.spacing_y < kFinestAsMetres && std::abs(place.origin_x) <= 360.0 && std::abs(place.origin_y) <= 90.0) {
@@ -287,6 +340,32 @@ void read_prj_beside(SourceInfo& info, int band) {
         "the coordinates look like degrees, but no .prj beside the file says so; with one, or with `sample_spacing`, "
         "distances would be in metres");
   }
+}
+
+}  // namespace
+
+void read_auxiliary_metadata(SourceInfo& info, int band) {
+  const AuxiliaryFile file(info.path);
+  file.place(info);
+  if (band > 0) file.describe(info, band);
+}
+
+void name_bands_beside(const std::string& raster_path, std::size_t bands, std::vector<std::string>& names) {
+  const AuxiliaryFile file(raster_path);
+  names.resize(std::max(bands, names.size()));
+  for (std::size_t i = 0; i < bands; ++i) {
+    if (names[i].empty()) names[i] = trimmed(file.text(fmt::format("{}/Description", i + 1)));
+  }
+}
+
+void read_prj_beside(SourceInfo& info) {
+  if (!take_prj(info)) suspect_degrees(info);
+}
+
+void read_files_beside(SourceInfo& info, int band) {
+  const bool is_known = has_reference_system(info.georeference) || take_prj(info);
+  read_auxiliary_metadata(info, band);
+  if (!is_known) suspect_degrees(info);
 }
 
 void place_by(const WorldFile& world, std::int64_t rows, Georeference& place) {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "isohf/raster.h"
 
@@ -34,16 +35,23 @@ struct WorldFile {
 /// systems without case. Empty where there is none.
 [[nodiscard]] std::string file_beside(const std::string& beside, const std::string& name);
 
-/// Reads the .prj beside info.path, where there is one, with read_wkt, else what read_auxiliary_metadata finds; a .prj
-/// that is no WKT becomes a warning, and so do coordinates that look like degrees without one.
-void read_prj_beside(SourceInfo& info, int band = 0);
-
 /// Reads NAME.EXT.aux.xml, in which GDAL keeps what a raster's format has no room for ("Persistent Auxiliary
-/// Metadata"): where the raster lies, its reference system, and a void value, unit, scale and offset for each band.
-/// `band` counts from 1; with 0 none of the latter is taken. Takes what `info` does not know yet, and leaves what it
-/// knows; statistics and all else are passed over. No such file: nothing happens. Throws Error naming the file:
-/// kCorrupt where it is not XML or its numbers are none, kUnsupported where it turns the raster or puts South on top.
+/// Metadata"): where the raster lies, its reference system, and for each band a void value, unit, scale and offset, and
+/// that bytes have signs. `band` counts from 1; with 0 none of the latter is taken. Takes what `info` does not know yet
+/// and leaves what it knows, with a note where the two differ; statistics and all else are passed over. No such file:
+/// nothing happens. Throws Error naming the file: kCorrupt where it is not XML or its numbers are none, kUnsupported
+/// where it turns the raster or puts South on top.
 void read_auxiliary_metadata(SourceInfo& info, int band);
+
+/// Gives `bands` bands the names that the same file has for those without one.
+void name_bands_beside(const std::string& raster_path, std::size_t bands, std::vector<std::string>& names);
+
+/// Reads the .prj beside info.path, where there is one, with read_wkt. One that is no WKT becomes a warning, and so do
+/// coordinates that look like degrees without one.
+void read_prj_beside(SourceInfo& info);
+
+/// What lies beside a grid: the .prj, where the grid does not know its reference system, then read_auxiliary_metadata.
+void read_files_beside(SourceInfo& info, int band);
 
 /// Spacing and origin of a raster of `rows` rows; the origin is the northernmost row's, whichever the file has first.
 void place_by(const WorldFile& world, std::int64_t rows, Georeference& place);

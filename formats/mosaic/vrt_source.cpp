@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/files/bands.h"
 #include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/files/text_tokens.h"
@@ -62,7 +63,8 @@ class Deeper {
 struct Piece {
   std::string path;
   std::int64_t band = 1;
-  Window from;  ///< of the file
+  std::optional<SampleType> type;  ///< as the VRT says
+  Window from;                     ///< of the file
   std::int64_t column = 0;
   std::int64_t row = 0;
   std::optional<double> skipped;  ///< of its values, which let what lies beneath through
@@ -173,15 +175,16 @@ class VrtSource final : public FileSource {
         bands[static_cast<std::size_t>(choose_band(info_, options, static_cast<std::int64_t>(bands.size()), names))];
     const std::string kind = band.attribute("subClass").value();
     if (!kind.empty() && kind != "VRTSourcedRasterBand") refuse("has a " + printable(kind));
+    for (const pugi::xml_node& node : band.children()) read_source(node);
     read_type(band);
     read_system(root);
     if (const auto nodata = band.child("NoDataValue")) read_gdal_nodata(nodata.text().get(), info_);
     for (const auto& [role, element] : {std::pair{"unittype", "UnitType"}, {"scale", "Scale"}, {"offset", "Offset"}}) {
       if (const auto node = band.child(element)) read_gdal_item(role, trimmed(node.text().get()), info_);
     }
-    for (const pugi::xml_node& node : band.children()) read_source(node);
     info_.block_width = info_.width;
     type_ = info_.sample_type;
+    tell_narrow_type();
     if (info_.void_values.empty() && options.void_values.empty() && !is_floating(type_) && has_gaps()) {
       const MosaicSamples samples = choose_mosaic_samples({SampleKind::of(info_)}, true, nullptr);
       info_.sample_type = samples.kind.type;
@@ -199,8 +202,8 @@ class VrtSource final : public FileSource {
     arrange();
   }
 
-  void read_type(const pugi::xml_node& band) {
-    const std::string name = band.attribute("dataType").as_string("Byte");
+  /// By the name that GDAL has for a type; nullopt where isohf has none for it.
+  static std::optional<SampleType> type_called(std::string_view name) {
     static constexpr std::array<std::pair<std::string_view, SampleType>, 8> kTypes = {
         {{"Byte", SampleType::kUint8},
          {"Int8", SampleType::kInt8},
@@ -211,8 +214,62 @@ class VrtSource final : public FileSource {
          {"Float32", SampleType::kFloat32},
          {"Float64", SampleType::kFloat64}}};
     const auto* const found = std::ranges::find(kTypes, name, &std::pair<std::string_view, SampleType>::first);
-    if (found == kTypes.end()) refuse("has samples of the type " + printable(name));
-    info_.sample_type = found->second;
+    return found == kTypes.end() ? std::nullopt : std::optional(found->second);
+  }
+
+  void read_type(const pugi::xml_node& band) {
+    const std::string name = band.attribute("dataType").as_string("Byte");
+    const std::optional<SampleType> type = type_called(name);
+    if (!type) refuse("has samples of the type " + printable(name));
+    info_.sample_type = *type;
+    if (type != SampleType::kUint8) return;
+    const auto structure = band.find_child_by_attribute("Metadata", "domain", "IMAGE_STRUCTURE");
+    const auto sign = structure.find_child_by_attribute("MDI", "key", "PIXELTYPE");
+    has_signed_bytes_ = std::string_view(sign.text().get()) == "SIGNEDBYTE";
+    if (!pieces_.empty()) {
+      if (const auto first = type_in(pieces_.front())) pieces_.front().type = first;
+      has_signed_bytes_ |= pieces_.front().type == SampleType::kInt8;  // gdalbuildvrt does not say so
+    }
+    if (has_signed_bytes_) info_.sample_type = SampleType::kInt8;
+  }
+
+  /// What the samples of a source are; nullopt where it cannot be opened, which is told when it is read.
+  [[nodiscard]] std::optional<SampleType> type_in(const Piece& piece) const {
+    try {
+      const Deeper deeper(depth);
+      return open(piece)->info().sample_type;
+    } catch (const Error&) {
+      return std::nullopt;
+    }
+  }
+
+  /// Of a source whose type holds numbers that the VRT's does not. What a VRT says of its sources is believed; of those
+  /// of which it says nothing the first is opened.
+  void tell_narrow_type() {
+    bool has_looked = false;
+    for (const Piece& piece : pieces_) {
+      std::optional<SampleType> type = piece.type;
+      if (!type && !std::exchange(has_looked, true)) type = type_in(piece);
+      // GDAL calls signed bytes bytes as well.
+      if (has_signed_bytes_ && type == SampleType::kUint8 && &piece != &pieces_.front()) continue;
+      if (!type || holds(*type)) continue;
+      info_.warnings.push_back(loss(fmt::format(
+          "its samples are {}, those of {} {}: numbers that {} does not hold are clamped or rounded, as its dataType "
+          "says; another one, or the files themselves as the input, keep them",
+          to_string(type_), one_line(piece.path), to_string(*type), to_string(type_))));
+      return;
+    }
+  }
+
+  /// Whether the VRT's type has all numbers of another.
+  [[nodiscard]] bool holds(SampleType other) const {
+    SourceInfo of;
+    std::vector<SampleKind> kinds;
+    for (const SampleType type : {type_, other}) {
+      of.sample_type = type;
+      kinds.push_back(SampleKind::of(of));
+    }
+    return choose_mosaic_samples(kinds, false, nullptr).kind.type == type_;
   }
 
   void read_system(const pugi::xml_node& root) {
@@ -270,7 +327,9 @@ class VrtSource final : public FileSource {
       piece.offset = element_number(node, "ScaleOffset").value_or(0.0);
     }
     // A claim, which at worst costs time.
-    const double block = number(node.child("SourceProperties"), "BlockYSize", 1.0);
+    const pugi::xml_node properties = node.child("SourceProperties");
+    piece.type = type_called(properties.attribute("DataType").value());
+    const double block = number(properties, "BlockYSize", 1.0);
     block_rows_ = std::max(
         block_rows_, static_cast<std::int64_t>(std::max(1.0, std::min(block, static_cast<double>(piece.from.rows)))));
     pieces_.push_back(std::move(piece));
@@ -375,21 +434,30 @@ class VrtSource final : public FileSource {
     return uncovered(std::move(covered), {0, 0, info_.width, info_.height}, first) > 0;
   }
 
+  [[nodiscard]] std::unique_ptr<HeightSource> open(const Piece& piece) const {
+    OpenOptions options;
+    options.unpacked_bytes = unpacked_bytes_;
+    if (piece.band > 1) options.channel = fmt::format("{}", piece.band - 1);
+    try {
+      std::unique_ptr<HeightSource> source = open_raster(piece.path, options);
+      // A band called elevations was chosen, where there is one, and the VRT wants the first.
+      const SourceInfo& info = source->info();
+      if (piece.band > 1 || info.channel.empty() || band_of_heights({"", info.channel}) == 0) return source;
+      if (info.format == "OpenEXR" || info.format.starts_with("netCDF")) return source;  // whose channels have no order
+      options.channel = "0";
+      return open_raster(piece.path, options);
+    } catch (const Error& error) {
+      throw error.within(info_.path);
+    }
+  }
+
   HeightSource& source_of(const Piece& piece) {
     const auto found = std::ranges::find(opened_, &piece, &Opened::piece);
     if (found != opened_.end()) {
       opened_.splice(opened_.begin(), opened_, found);
       return *opened_.front().source;
     }
-    OpenOptions options;
-    options.unpacked_bytes = unpacked_bytes_;
-    if (piece.band > 1) options.channel = fmt::format("{}", piece.band - 1);
-    std::unique_ptr<HeightSource> source;
-    try {
-      source = open_raster(piece.path, options);
-    } catch (const Error& error) {
-      throw error.within(info_.path);
-    }
+    std::unique_ptr<HeightSource> source = open(piece);
     const SourceInfo& info = source->info();
     if (piece.from.column + piece.from.columns > info.width || piece.from.row + piece.from.rows > info.height) {
       fail(ErrorCode::kCorrupt,
@@ -448,7 +516,8 @@ class VrtSource final : public FileSource {
   }
 
   std::uint64_t unpacked_bytes_;
-  std::uint64_t limit_ = 0;       ///< of the buffers of one source
+  std::uint64_t limit_ = 0;  ///< of the buffers of one source
+  bool has_signed_bytes_ = false;
   SampleType type_{};             ///< as the VRT has it; that of `info_` may be wider, for a void
   std::vector<std::byte> empty_;  ///< what stands where no piece is
   std::vector<Piece> pieces_;     ///< later ones lie above

@@ -168,7 +168,7 @@ class NetcdfSource final : public DescribedSource {
         layout_.stored_as = raster.variable->type == 10 ? StoredAs::kInt64 : StoredAs::kUint64;
       }
     }
-    finish(options);
+    finish(options, 0);  // GDAL looks nowhere else for the meaning of a variable
   }
 
  private:

@@ -132,7 +132,7 @@ class Netcdf4Source final : public HeightSource {
     file_ = std::make_unique<Netcdf4File>(path);
     raster_ = read_cf(*file_, info_, options);
     bound_undeclared_voids(info_);
-    if (!has_reference_system(info_.georeference)) read_prj_beside(info_);
+    read_files_beside(info_, 0);  // GDAL looks nowhere else for the meaning of a variable
     read_chunks();
     apply_open_options(info_, options);
     limit_buffers(kMostKeptBytes);

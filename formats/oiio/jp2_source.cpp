@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "formats/files/bands.h"
 #include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"

@@ -1,3 +1,4 @@
+#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <fmt/format.h>

@@ -15,13 +15,13 @@
 #include <vector>
 
 #include "formats/binary_grids/described_source.h"
+#include "formats/files/bands.h"
 #include "formats/files/text.h"
 #include "formats/files/text_tokens.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/map_wkt.h"
 #include "formats/georeference/reference_system.h"
 #include "formats/georeference/units.h"
-#include "formats/open_options.h"
 #include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/projection/reference_map.h"
@@ -143,7 +143,7 @@ class Pds4Source final : public DescribedSource {
     layout_.from_south = text_in(direction, "vertical_display_direction") == "Bottom to Top";
     read_constants(child(array_, "Special_Constants"));
     read_place(label);
-    finish(options);
+    finish(options, 0);
   }
 
  private:

@@ -1,3 +1,4 @@
+#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <fmt/core.h>
@@ -292,7 +293,13 @@ class AsciiGridSource final : public FileSource {
     } else {
       header.read_void(info_);
     }
-    read_prj_beside(info_, 1);
+    read_files_beside(info_, 1);
+    if (!marked_ && info_.void_values.empty() && !marker_.empty()) {
+      info_.warnings.emplace_back(
+          fmt::format("the header names no void value, but {} occurs; if it means a void, give `void_values` {}",
+                      marker_, marker_),
+          Warning::Kind::kUndeclaredNodata);
+    }
     info_.block_width = info_.width;
     apply_open_options(info_, options);
   }
@@ -382,12 +389,6 @@ class AsciiGridSource final : public FileSource {
     info_.sample_type = whole ? SampleType::kInt32 : SampleType::kFloat64;
     if (decimal_ == ',') {
       info_.warnings.emplace_back("the numbers have decimal commas: 1,5 is read as one and a half");
-    }
-    if (!marked_ && !marker_.empty()) {
-      info_.warnings.emplace_back(
-          fmt::format("the header names no void value, but {} occurs; if it means a void, give `void_values` {}",
-                      marker_, marker_),
-          Warning::Kind::kUndeclaredNodata);
     }
   }
 

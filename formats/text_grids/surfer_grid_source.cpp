@@ -1,3 +1,4 @@
+#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <fmt/format.h>
@@ -58,7 +59,7 @@ class SurferGridSource final : public PlainSource {
     if (info_.void_values.empty()) {
       info_.void_values = {info_.sample_type == SampleType::kFloat32 ? double{1.70141e38F} : 1.70141e38};
     }
-    read_prj_beside(info_, 1);
+    read_files_beside(info_, 1);
     info_.block_width = info_.width;
     info_.block_height = 1;
     apply_open_options(info_, options);

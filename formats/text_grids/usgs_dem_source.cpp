@@ -1,3 +1,4 @@
+#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <fmt/format.h>
@@ -20,6 +21,7 @@
 #include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/files/text_tokens.h"
+#include "formats/georeference/files_beside.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -253,6 +255,9 @@ class UsgsDemSource final : public FileSource {
     header.read_system(info_);
     info_.block_width = info_.width;
     info_.block_height = std::min(info_.height, kRowsAtOnce);
+    const double own_scale = std::exchange(info_.z_scale, 1.0);  // which GDAL's samples have been multiplied by
+    read_auxiliary_metadata(info_, 1);
+    info_.z_scale *= own_scale;
     apply_open_options(info_, options);
   }
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "formats/binary_grids/plain_samples.h"
+#include "formats/files/bands.h"
 #include "formats/files/text.h"
 #include "formats/files/text_tokens.h"
 #include "formats/georeference/files_beside.h"
@@ -246,10 +247,6 @@ class XyzSource final : public PlainSource {
                        points_, info_.width, info_.height));
     }
     info_.sample_type = whole_ ? SampleType::kInt32 : SampleType::kFloat64;
-    if (whole_) {
-      info_.void_values = {static_cast<double>(kNoWhole)};
-      info_.valid_min = static_cast<double>(kNoWhole) + 1.0;  // void whatever `void_values` say
-    }
     const auto size = static_cast<std::uint64_t>(size_bytes(info_.sample_type));
     layout_.from_south = true;
     layout_.big_endian = kSwapsBytes;  // the scratch file has memory's order
@@ -270,7 +267,11 @@ class XyzSource final : public PlainSource {
     place.has_origin = true;
     place.origin_x = x.first();
     place.origin_y = y.first() + static_cast<double>(info_.height - 1) * y.step();
-    read_prj_beside(info_, 1);
+    read_files_beside(info_, 1);
+    if (whole_) {
+      info_.void_values.insert(info_.void_values.begin(), static_cast<double>(kNoWhole));
+      info_.valid_min = static_cast<double>(kNoWhole) + 1.0;  // void whatever `void_values` say
+    }
     info_.block_width = info_.width;
     info_.block_height = by_columns_ ? std::min<std::int64_t>(info_.height, 64) : 1;
     apply_open_options(info_, options);

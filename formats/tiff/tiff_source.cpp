@@ -1,3 +1,4 @@
+#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <fmt/core.h>
@@ -225,7 +226,7 @@ int choose_channel(const TiffLayout& layout, const std::vector<std::string>& des
     if (!described[i].empty()) names[i] = printable(described[i]);
   }
   const auto label = [&](std::size_t i) { return names[i].empty() ? std::to_string(i) : names[i]; };
-  std::size_t chosen = 0;
+  std::size_t chosen = described.empty() ? 0 : band_of_heights(described);
   if (!wanted.empty()) {
     chosen = static_cast<std::size_t>(std::find(names.begin(), names.end(), upper_case(wanted)) - names.begin());
     if (chosen == names.size()) {
@@ -248,7 +249,7 @@ int choose_channel(const TiffLayout& layout, const std::vector<std::string>& des
                 "is a colour picture of 8 bits; say which channel holds elevations (`channel` R)");
   }
   if (wanted.empty() && names.size() > 1 && !has_grey_and_opacity(layout)) {
-    info.warnings.push_back(fmt::format("there are {} channels; channel {} is read", names.size(), label(0)));
+    info.warnings.push_back(fmt::format("there are {} channels; channel {} is read", names.size(), label(chosen)));
   }
   return static_cast<int>(chosen);
 }
@@ -315,8 +316,9 @@ class TiffSource final : public HeightSource {
     info_.height = layout_.height;
     info_.sample_type = sample_type_of(layout_);
     for (const std::string& warning : tags.warnings) info_.warnings.push_back("libtiff: " + warning);
-    channel_ =
-        choose_channel(layout_, gdal_band_names(tags.gdal_metadata, layout_.samples_per_pixel), options.channel, info_);
+    std::vector<std::string> names = gdal_band_names(tags.gdal_metadata, layout_.samples_per_pixel);
+    if (page_ == 0 && names.size() > 1) name_bands_beside(info_.path, names.size(), names);
+    channel_ = choose_channel(layout_, names, options.channel, info_);
     if (directories.images > 1 && options.part.empty()) {
       info_.warnings.push_back(
           fmt::format("there are {} images in the file; the first is read, `part` 0 to {} names one",
@@ -328,8 +330,8 @@ class TiffSource final : public HeightSource {
     mask_ = directories.mask;
     place(tags);
     read_gdal_metadata(tags.gdal_metadata, channel_, info_);
-    read_gdal_nodata(tags.gdal_nodata, info_);
     read_files_beside();
+    if (info_.void_values.empty()) read_gdal_nodata(tags.gdal_nodata, info_);  // as for GDAL
     check_orientation();
     bound_undeclared_voids(info_);
   }

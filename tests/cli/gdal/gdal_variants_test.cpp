@@ -214,6 +214,23 @@ TEST_F(GdalVariants, OtherFormats) {
   }
 }
 
+TEST_F(GdalVariants, WhatGdalKeepsBesideSaysWhatSamplesMean) {
+  const auto scaled = [](const char* name, std::vector<std::string> options) {
+    for (const char* more : {"-a_scale", "0.1", "-a_offset", "800"}) options.emplace_back(more);
+    return Variant{name, options};
+  };
+  for (const Variant& variant :
+       {scaled("a.asc", {"-of", "AAIGrid", "-a_nodata", "-9999"}), scaled("b.bil", {"-of", "EHdr", "-a_nodata", "7"}),
+        scaled("c.sdat", {"-of", "SAGA"}), scaled("d.img", {"-of", "HFA", "-a_nodata", "7"}),
+        scaled("e.rst", {"-of", "RST"}), scaled("f.dem", {"-of", "ROI_PAC", "-a_nodata", "7"}),
+        scaled("g.dat", {"-of", "ENVI"}), scaled("h.xyz", {"-of", "XYZ"})}) {
+    expect_same("whole.tif", variant);
+  }
+  for (const Variant& variant : {scaled("text.grd", {"-of", "GSAG"}), scaled("six.grd", {"-of", "GSBG"})}) {
+    expect_same("real.tif", variant);
+  }
+}
+
 TEST_F(GdalVariants, SamplesThatAHeaderDescribes) {
   for (const Variant& variant :
        std::vector<Variant>{{"a.bsq", {"-of", "ENVI"}},

@@ -10,6 +10,7 @@
 namespace isohf::test {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 /// What GDAL 3.6 writes beside a PNG, shortened; statistics and histograms are what most such files hold.
@@ -95,6 +96,45 @@ TEST_F(AuxiliaryMetadata, LeavesWhatTheRasterSaysItself) {
   EXPECT_EQ(info_.georeference.origin_x, 3.0);
   EXPECT_EQ(info_.georeference.unit, HorizontalUnit::kMetre);
   EXPECT_EQ(info_.georeference.registration, Registration::kArea);
+  EXPECT_THAT(
+      info_.warnings,
+      ElementsAre(
+          "a.png.aux.xml gives the void value -32768; followed is the raster itself, which gives 5 (`void_values` "
+          "-32768 takes the other)",
+          "a.png.aux.xml gives elevations as sample * 0.1 + 100; followed is the raster itself, which gives "
+          "sample * 2 + 0",
+          "a.png.aux.xml gives the unit foot; followed is the raster itself, which gives metre"));
+}
+
+TEST_F(AuxiliaryMetadata, SaysThatBytesHaveSigns) {
+  beside(
+      R"(<PAMDataset><PAMRasterBand band="1"><Metadata domain="IMAGE_STRUCTURE"><MDI key="PIXELTYPE">SIGNEDBYTE</MDI>)"
+      R"(</Metadata><NoDataValue>-5</NoDataValue></PAMRasterBand></PAMDataset>)");
+  info_.sample_type = SampleType::kUint8;
+  read_auxiliary_metadata(info_, 1);
+  EXPECT_EQ(info_.sample_type, SampleType::kInt8);
+  EXPECT_EQ(info_.void_values, std::vector<double>{-5.0});
+  info_.sample_type = SampleType::kUint8;
+  info_.void_values = {251.0};  // as the raster had it
+  read_auxiliary_metadata(info_, 1);
+  EXPECT_EQ(info_.void_values, std::vector<double>{-5.0});
+  EXPECT_TRUE(info_.warnings.empty());
+}
+
+TEST_F(AuxiliaryMetadata, WhatCannotBeUsedIsLost) {
+  beside(R"(<PAMDataset><PAMRasterBand band="1"><NoDataValue>1e9</NoDataValue><Scale>0</Scale><Offset>much</Offset>)"
+         R"(</PAMRasterBand></PAMDataset>)");
+  read_auxiliary_metadata(info_, 1);
+  ASSERT_EQ(info_.warnings.size(), 3U);
+  for (const Warning& warning : info_.warnings) EXPECT_EQ(warning.kind, Warning::Kind::kLoss) << warning;
+  EXPECT_EQ(info_.z_scale, 1.0);
+}
+
+TEST_F(AuxiliaryMetadata, NamesTheBandsThatHaveNoName) {
+  beside(kAll);
+  std::vector<std::string> names = {"", "", "own"};
+  name_bands_beside(info_.path, 3, names);
+  EXPECT_THAT(names, ElementsAre("", "a <b>", "own"));
 }
 
 TEST_F(AuxiliaryMetadata, SaysWhatIsWrongInOneLine) {
@@ -108,6 +148,7 @@ TEST_F(AuxiliaryMetadata, SaysWhatIsWrongInOneLine) {
   for (const char* turned : {"1, 2, 0.1, 4, 0, -2", "1, 2, 0, 4, 0.1, -2", "1, -2, 0, 4, 0, -2", "1, 2, 0, 4, 0, 2"}) {
     error = error_with(std::string("<PAMDataset><GeoTransform>") + turned + "</GeoTransform></PAMDataset>");
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported) << turned;
+    EXPECT_THAT(error.what(), HasSubstr("gdalwarp turns it")) << turned;
   }
 }
 

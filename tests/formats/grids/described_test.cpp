@@ -113,6 +113,38 @@ TEST_F(Envi, GainsAndOffsetsAreTheBandsOwn) {
   EXPECT_THAT(failure("a.dat"), HasSubstr("data gain values gives a scale of 0"));
 }
 
+TEST_F(Envi, BytesHaveSignsWhereGdalsFileSaysSo) {
+  write("a.dat", std::string("\xFF\x01\xFB\x80", 4));
+  write("a.hdr", "ENVI\nsamples = 2\nlines = 2\ndata type = 1\ndata ignore value = -5\n");
+  write(
+      "a.dat.aux.xml",
+      R"(<PAMDataset><PAMRasterBand band="1"><Metadata domain="IMAGE_STRUCTURE"><MDI key="PIXELTYPE">SIGNEDBYTE</MDI>)"
+      R"(</Metadata></PAMRasterBand></PAMDataset>)");
+  const auto source = open("a.dat");
+  EXPECT_THAT(values_of(*source), ElementsAre(-1, 1, -5, -128));
+  EXPECT_THAT(source->info().void_values, ElementsAre(-5));
+}
+
+TEST_F(Envi, TheBandWhoseNameSaysElevationsIsRead) {
+  write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
+  write("a.hdr", envi("band names = {slope, Elevation (m)}\n"));
+  EXPECT_THAT(values_of(*open("a.dat")), ElementsAre(2, 4, 6, 8));
+  EXPECT_EQ(open("a.dat")->info().channel, "Elevation (m)");
+  EXPECT_THAT(open("a.dat")->info().warnings, ElementsAre("there are 2 bands; channel Elevation (m) is read"));
+  EXPECT_THAT(values_of(*open("a.dat", "0")), ElementsAre(1, 3, 5, 7));
+  write("a.hdr", envi(""));
+  EXPECT_THAT(values_of(*open("a.dat")), ElementsAre(1, 3, 5, 7));
+  write("a.dat.aux.xml",
+        R"(<PAMDataset><PAMRasterBand band="2"><Description>z</Description></PAMRasterBand></PAMDataset>)");
+  EXPECT_THAT(values_of(*open("a.dat")), ElementsAre(2, 4, 6, 8));
+  // A virtual raster names its band by a number.
+  write("a.vrt",
+        R"(<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Int16" band="1"><SimpleSource>)"
+        R"(<SourceFilename relativeToVRT="1">a.dat</SourceFilename><SourceBand>1</SourceBand></SimpleSource>)"
+        R"(</VRTRasterBand></VRTDataset>)");
+  EXPECT_THAT(values_of(*open("a.vrt")), ElementsAre(1, 3, 5, 7));
+}
+
 TEST_F(Envi, WholeNumbersOf64BitsAreFloat64) {
   write("a.dat", stored<std::int64_t>({1, -2, 1LL << 50, 4}, true));
   write("a.hdr", "ENVI\nsamples = 2\nlines = 2\ndata type = 14\nbyte order = 1\n");
@@ -410,6 +442,53 @@ TEST_F(Vrt, NodataOf15DigitsIsTheFloatThatItMeans) {
   write("a.dat", stored<float>({1.0F, 2.0F, 0.1F, 4.0F}));
   EXPECT_THAT(vrt("0.100000001490116"), ElementsAre(1.0, 2.0, -9.0, 4.0));
   EXPECT_THAT(vrt("0.11"), ElementsAre(1.0, 2.0, 0.1F, 4.0));
+}
+
+TEST_F(Vrt, BytesHaveSignsWhereItOrTheSourceSaysSo) {
+  write("a.npy", std::string("\x93NUMPY\1\0\x46\0", 10) +
+                     "{'descr': '|i1', 'fortran_order': False, 'shape': (2, 2), }          \n" +
+                     std::string("\xFF\x01\xFB\x80", 4));
+  // The second is what gdalbuildvrt writes.
+  for (const char* sign :
+       {R"(<Metadata domain="IMAGE_STRUCTURE"><MDI key="PIXELTYPE">SIGNEDBYTE</MDI></Metadata>)", ""}) {
+    write("a.vrt",
+          fmt::format(R"(<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Byte" band="1">{})"
+                      R"(<NoDataValue>-5</NoDataValue><SimpleSource><SourceFilename relativeToVRT="1">a.npy)"
+                      R"(</SourceFilename><SourceBand>1</SourceBand><SourceProperties DataType="Byte"/>)"
+                      R"(</SimpleSource></VRTRasterBand></VRTDataset>)",
+                      sign));
+    EXPECT_THAT(values_of(*open("a.vrt")), ElementsAre(-1, 1, -5, -128));
+    EXPECT_THAT(open("a.vrt")->info().void_values, ElementsAre(-5));
+    EXPECT_TRUE(open("a.vrt")->info().warnings.empty());
+  }
+}
+
+TEST_F(Vrt, ATypeThatDoesNotHoldTheSourcesSamplesIsTold) {
+  write("a.dat", stored<float>({1.0F, 2.5F, 300.0F, 4.0F}));
+  write("a.hdr", "ENVI\nsamples = 2\nlines = 2\ndata type = 4\n");
+  const auto vrt = [&](const std::string& type, const std::string& properties) {
+    write("a.vrt", fmt::format(R"(<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="{}" band="1">)"
+                               R"(<SimpleSource><SourceFilename relativeToVRT="1">a.dat</SourceFilename>)"
+                               R"(<SourceBand>1</SourceBand>{}</SimpleSource></VRTRasterBand></VRTDataset>)",
+                               type, properties));
+    return open("a.vrt")->info().warnings;
+  };
+  for (const char* properties : {"", R"(<SourceProperties DataType="Float32"/>)"}) {
+    for (const char* narrow : {"Byte", "Int16", "Int32"}) {
+      const std::vector<Warning> warnings = vrt(narrow, properties);
+      ASSERT_EQ(warnings.size(), 1U);
+      EXPECT_EQ(warnings[0].kind, Warning::Kind::kLoss);
+      EXPECT_THAT(warnings[0], HasSubstr("a.dat float32: numbers that "));
+    }
+    for (const char* wide : {"Float32", "Float64"}) EXPECT_TRUE(vrt(wide, properties).empty());
+  }
+}
+
+TEST_F(Vrt, RowsFromTheSouthAreRefusedByTheirNumber) {
+  write("a.vrt",
+        R"(<VRTDataset rasterXSize="2" rasterYSize="2"><GeoTransform> 4.9000000000000000e+05, 3.0000000000e+01)"
+        R"(, 0.0, 5.0e+06, 0.0, 3.0e+01</GeoTransform><VRTRasterBand dataType="Byte" band="1"/></VRTDataset>)");
+  EXPECT_THAT(failure("a.vrt"), HasSubstr("a dy of 30 and"));
 }
 
 TEST_F(Vrt, MoreSourcesThanMayBeOpenLieOverEachOtherInTheirOrder) {

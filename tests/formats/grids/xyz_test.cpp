@@ -106,6 +106,19 @@ TEST_F(Xyz, WhatGdalKeepsBesideIsRead) {
   EXPECT_EQ(source->info().vertical_unit, "foot");
 }
 
+TEST_F(Xyz, TheVoidValueBesideIsOneOfWholeNumbersToo) {
+  write_file(folder_ / "a.xyz.aux.xml",
+             "<PAMDataset><PAMRasterBand band=\"1\"><NoDataValue>3</NoDataValue></PAMRasterBand></PAMDataset>");
+  for (const char* last : {"4", "4.5", ""}) {
+    const auto source =
+        open(std::string("0 0 1\n1 0 2\n2 0 5\n0 1 3\n") + (*last != '\0' ? "1 1 4\n2 1 " : "1 1 7") + last);
+    EXPECT_TRUE(is_void(source->info(), 3.0)) << last;
+    EXPECT_FALSE(is_void(source->info(), 2.0)) << last;
+    const std::vector<double> values = values_of(*source);
+    EXPECT_EQ(is_void(source->info(), values[2]), *last == '\0') << "where no point is";
+  }
+}
+
 TEST_F(Xyz, CoordinatesMayBeRounded) {
   std::string text;
   for (int row = 0; row < 40; ++row) {

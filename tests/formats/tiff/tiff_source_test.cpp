@@ -162,6 +162,14 @@ TEST_F(TiffSource, TakesVoidsAndScaleFromGdalTags) {
   EXPECT_EQ(info_of(tiff, options).void_values, Values{5});
 }
 
+TEST_F(TiffSource, TakesTheVoidValueBesideBeforeItsOwn) {
+  test::write_file(folder_ / "a.tif.aux.xml",
+                   "<PAMDataset><PAMRasterBand band=\"1\"><NoDataValue>4</NoDataValue></PAMRasterBand></PAMDataset>");
+  const SourceInfo info = info_of(small().ascii(42113, "-32768"));
+  EXPECT_EQ(info.void_values, Values{4});
+  EXPECT_TRUE(info.warnings.empty());
+}
+
 TEST_F(TiffSource, WarnsOfVoidsThatCannotBe) {
   for (const char* text : {"-99999", "nan", "none", "1.5", "1e999"}) {
     const SourceInfo info = info_of(small().ascii(42113, text));
@@ -219,6 +227,27 @@ TEST_F(TiffSource, PicksTheChannel) {
     options.channel = wrong;
     EXPECT_EQ(code_of(tiff, options), ErrorCode::kInvalidArgument) << wrong;
   }
+}
+
+TEST_F(TiffSource, PicksTheChannelThatIsDescribedAsElevations) {
+  const auto described = [](const std::string& first, const std::string& second) {
+    TiffBytes tiff;
+    tiff.image(2, 1, 16, 1, 1).shorts(277, {3}).shorts(258, {16, 16, 16}).shorts(338, {0, 0}).shorts(339, {1, 1, 1});
+    tiff.block(bytes_of<std::uint16_t>({10, 20, 30, 11, 21, 31}));
+    const std::string item = "<Item name=\"DESCRIPTION\" sample=\"{}\" role=\"description\">{}</Item>";
+    return tiff.ascii(42112, "<GDALMetadata>" + fmt::format(fmt::runtime(item), 0, first) +
+                                 fmt::format(fmt::runtime(item), 1, second) + "</GDALMetadata>");
+  };
+  EXPECT_EQ(values(described("slope", "elevation")), (Values{20, 21}));
+  EXPECT_EQ(info_of(described("slope", "elevation")).warnings,
+            std::vector<Warning>{"there are 3 channels; channel elevation is read"});
+  EXPECT_EQ(values(described("Z", "DEM [m]")), (Values{20, 21}));
+  EXPECT_EQ(values(described("slope", "z")), (Values{20, 21}));
+  EXPECT_EQ(values(described("Height", "elevation")), (Values{10, 11}));
+  EXPECT_EQ(values(described("slope", "elevation error")), (Values{10, 11}));
+  OpenOptions options;
+  options.channel = "0";
+  EXPECT_EQ(values(described("slope", "elevation"), options), (Values{10, 11}));
 }
 
 TEST_F(TiffSource, RefusesAColourPictureUnlessAChannelIsNamed) {
