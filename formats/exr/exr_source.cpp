@@ -41,7 +41,8 @@
 namespace isohf {
 namespace {
 
-/// After kHeightWords, which may be the name of a channel or its layer in any case, channels called so, in any case; those of layers of normals and the like are something else.
+/// After kHeightWords, which may be the name of a channel or its layer in any case, channels called so, in any case; those
+/// of layers of normals and the like are something else, and opacity is last.
 constexpr std::array kPreferredChannels = {"y", "z", "depth", "r"};
 constexpr std::array kOtherLayers = {"n", "normal", "normals", "uv", "st", "motion", "velocity", "tangent"};
 /// The order in which OpenImageIO, and so oiiotool, lists the channels of a layer; others follow by name.
@@ -169,23 +170,28 @@ Channel named_channel(const std::vector<Channel>& channels, const std::string& w
                                                        list_of(channels), channels.size() - 1));
 }
 
+/// How likely a channel holds elevations, the likeliest 0: "height", then "height.Y" or "terrain.height", then "Y", then
+/// "beauty.Y"; from kNoHeights on its name says nothing of them.
+constexpr std::size_t kNoHeights = 2 * (kHeightWords.size() + kPreferredChannels.size());
+std::size_t unlikeliness(const Channel& channel) {
+  const std::vector<std::string> components = components_of(channel.name);
+  const std::string& last = components.back();
+  const bool whole = components.size() == 1;
+  std::size_t words = kHeightWords.size();
+  for (const std::string& component : components) words = std::min(words, place_in(kHeightWords, component));
+  if (words < kHeightWords.size()) return words + (whole ? 0 : kHeightWords.size());
+  if (last == "a" || last == "alpha") return kNoHeights + 3;
+  if (!whole && place_in(kOtherLayers, components.front()) < kOtherLayers.size()) return kNoHeights + 2;
+  const std::size_t preferred = place_in(kPreferredChannels, last);
+  if (preferred == kPreferredChannels.size()) return kNoHeights + (whole ? 0 : 1);
+  return 2 * kHeightWords.size() + preferred + (whole ? 0 : kPreferredChannels.size());
+}
+
 /// The channel that most likely holds elevations; of those that are as likely the first, in the first part.
 Channel default_channel(const std::vector<Channel>& channels) {
   std::vector<Channel> candidates;
   std::ranges::copy_if(channels, std::back_inserter(candidates), [](const Channel& channel) { return !channel.deep; });
-  if (candidates.empty()) return channels.front();
-  // "height", then "height.Y" or "terrain.height", then "Y", then "beauty.Y", then what is left.
-  const auto rank = [](const Channel& channel) {
-    const std::vector<std::string> components = components_of(channel.name);
-    const bool whole = components.size() == 1;
-    std::size_t words = kHeightWords.size();
-    for (const std::string& component : components) words = std::min(words, place_in(kHeightWords, component));
-    if (words < kHeightWords.size()) return words + (whole ? 0 : kHeightWords.size());
-    const bool is_other = !whole && place_in(kOtherLayers, components.front()) < kOtherLayers.size();
-    return 2 * kHeightWords.size() + (whole ? 0 : kPreferredChannels.size() + 1) +
-           (is_other ? kPreferredChannels.size() : place_in(kPreferredChannels, components.back()));
-  };
-  return *std::ranges::min_element(candidates, {}, rank);
+  return candidates.empty() ? channels.front() : *std::ranges::min_element(candidates, {}, unlikeliness);
 }
 
 SampleType sample_type_of(Imf::PixelType type) {
@@ -295,8 +301,11 @@ class ExrSource final : public HeightSource {
     info_.channel = channels.size() > 1 || !channel_.part_name.empty() ? full_name(channel_) : std::string();
     sample_bytes_ = size_bytes(info_.sample_type);
     if (chosen_here && channels.size() > 1) {
-      info_.warnings.push_back(fmt::format("channel {} is read, of {} ({}); `channel` chooses another",
-                                           shown_name(channel_), channels.size(), list_of(channels)));
+      const bool is_guess = unlikeliness(channel_) >= kNoHeights;
+      const std::string text =
+          fmt::format("channel {} is read, of {} ({}){}; `channel` chooses another", shown_name(channel_),
+                      channels.size(), list_of(channels), is_guess ? ", none of which says height" : "");
+      info_.warnings.push_back(is_guess ? loss(text) : Warning(text));
     }
     if (data != display) {
       info_.warnings.push_back(fmt::format(

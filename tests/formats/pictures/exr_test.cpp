@@ -247,7 +247,11 @@ TEST(ExrSource, PrefersElevationChannelsAndSaysSo) {
       {{"N.Z", "Z"}, "Z"},
       {{"N.Y", "N.Z", "beauty.R"}, "beauty.R"},
       {{"Y", "terrain.Height"}, "terrain.Height"},
-      {{"Y", "ELEVATION"}, "ELEVATION"}};
+      {{"Y", "ELEVATION"}, "ELEVATION"},
+      {{"A", "displacement"}, "displacement"},
+      {{"Q", "layer.R"}, "layer.R"},
+      {{"A", "Q"}, "Q"},
+      {{"A", "N.X"}, "N.X"}};
   for (const auto& [channels, chosen] : cases) {
     ExrPicture picture;
     picture.channels = channels;
@@ -258,6 +262,8 @@ TEST(ExrSource, PrefersElevationChannelsAndSaysSo) {
     ASSERT_EQ(source->info().warnings.size(), 1U);
     EXPECT_THAT(source->info().warnings[0],
                 HasSubstr(fmt::format("channel {} is read, of {}", chosen, channels.size())));
+    const bool is_guess = chosen == "Q" || chosen == "G" || chosen == "N.X";
+    EXPECT_EQ(source->info().warnings[0].kind, is_guess ? Warning::Kind::kLoss : Warning::Kind::kNote) << chosen;
   }
 }
 
