@@ -39,7 +39,7 @@ class Session {
     Figures figures = Figures::kPlace;
     bool help = false;
     std::vector<std::string> place;  ///< under the cursor
-    double middle_distance = 0.0;    ///< of the ground in the middle of the picture; 0: there is none
+    double middle_distance = 0.0;    ///< of the ground in the middle of the picture, in true lengths; 0: there is none
     std::optional<Profile> profile;
     std::vector<Vec3> way;  ///< what is measured, as drawn
     double screen_scale = 1.0;

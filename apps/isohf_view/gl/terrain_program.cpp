@@ -43,7 +43,7 @@ out gl_PerVertex {
   vec4 gl_Position;
   float gl_ClipDistance[4];     // only looked at where the renderer asks for it
 };
-out float v_void;
+centroid out float v_void;       // not beyond the triangle, where a pixel of several samples only touches it
 #endif
 
 int code(int v) { return int(texelFetch(codes, v).r); }
@@ -118,7 +118,7 @@ void main() {
 
 constexpr const char* kDiscardVoid = R"glsl(
 #ifdef RIM
-in float v_void;
+centroid in float v_void;
 #define DISCARD_VOID if (v_void > 0.0) discard
 #else
 #define DISCARD_VOID

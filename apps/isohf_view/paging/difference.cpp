@@ -1,5 +1,7 @@
 #include "paging/difference.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -20,9 +22,12 @@ bool same_system(const SourceRecord& a, const SourceRecord& b) {
 }
 
 double unit_between(const Metadata& first, const Metadata& second) {
-  const auto a = linear_unit(first.vertical_unit);
-  const auto b = linear_unit(second.vertical_unit);
-  return a && b ? b->metres / a->metres : 1.0;
+  // What states none counts as metres, as everywhere.
+  const auto metres = [](const Metadata& metadata) {
+    const auto unit = linear_unit(metadata.vertical_unit);
+    return unit ? unit->metres : 1.0;
+  };
+  return metres(second) / metres(first);
 }
 
 }  // namespace
@@ -43,6 +48,12 @@ std::optional<WorldGeoreference> understood_places(const std::string& path) {
 
 WorldJoin::WorldJoin(const ArchiveReader& from, const ArchiveReader& to)
     : from_(understood_places(from.path())), to_(understood_places(to.path())) {
+  const std::string& body = from.metadata().source.body;
+  const std::string& other = to.metadata().source.body;
+  if (!body.empty() && !other.empty() && body != other) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{} lies on {}, {} on {}: they have no place in common",
+                                                         from.path(), body, to.path(), other));
+  }
   const auto both = [this](auto has) { return from_ && to_ && ((*from_).*has)() && ((*to_).*has)(); };
   const auto either = [this](auto has) { return (from_ && ((*from_).*has)()) || (to_ && ((*to_).*has)()); };
   by_source_ = both(&WorldGeoreference::has_source) && same_system(from.metadata().source, to.metadata().source);

@@ -13,7 +13,7 @@ namespace isohf::view {
 /// Heights along a straight way over the ground.
 struct Profile {
   std::vector<double> heights;  ///< evenly spaced, elevation units; NaN where there is no ground
-  double length = 0.0;          ///< world units
+  double length = 0.0;          ///< between its ends: metres along the body, or world units
 };
 
 /// What a person reads over a picture.

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
+
+#include "isohf/restore/ground_scale.h"
 
 namespace isohf::view {
 namespace {
@@ -62,9 +65,18 @@ Place probe(const TileSource& source, Ground& ground, WorldPoint at) {
   return source.describe(at, ground.height(at, source.covered()));
 }
 
+double distance_between(const TileSource& source, WorldPoint from, WorldPoint to) {
+  const Place first = source.describe(from, std::nullopt);
+  const Place second = source.describe(to, std::nullopt);
+  const bool is_known = source.metadata() != nullptr && source.ground_unit() == "metre" && first.geo && second.geo &&
+                        !std::isnan(first.geo->latitude + second.geo->latitude);
+  return is_known ? ground_distance_m(*source.metadata(), *first.geo, *second.geo)
+                  : std::hypot(to.x - from.x, to.z - from.z);
+}
+
 Profile profile_between(const TileSource& source, Ground& ground, WorldPoint from, WorldPoint to) {
   Profile profile;
-  profile.length = std::hypot(to.x - from.x, to.z - from.z);
+  profile.length = distance_between(source, from, to);
   for (int i = 0; i < kProfilePoints; ++i) {
     const double share = i / (kProfilePoints - 1.0);
     const WorldPoint at{from.x + share * (to.x - from.x), from.z + share * (to.z - from.z)};

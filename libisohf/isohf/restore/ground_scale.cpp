@@ -1,10 +1,9 @@
 #include "isohf/restore/ground_scale.h"
 
+#include <GeographicLib/Geodesic.hpp>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-
-#include "isohf/projection.h"
 
 namespace isohf {
 
@@ -19,6 +18,20 @@ GroundScale ground_scale(const Metadata& metadata) {
   const double middle = *source.origin_y - 0.5 * static_cast<double>(source.height - 1) * source.crs_spacing_y;
   const double length = degree * source.semi_major_axis_m.value_or(Ellipsoid{}.semi_major_axis_m);
   return {length * std::max(std::cos(middle * degree), 0.01), length};
+}
+
+double ground_distance_m(const Metadata& metadata, GeoPoint from, GeoPoint to) {
+  const SourceRecord& source = metadata.source;
+  Ellipsoid ellipsoid;
+  if (metadata.projection) {
+    ellipsoid = metadata.projection->spec.ellipsoid;
+  } else if (source.semi_major_axis_m) {
+    ellipsoid = {*source.semi_major_axis_m, source.inverse_flattening.value_or(0.0)};
+  }
+  double metres = 0.0;
+  GeographicLib::Geodesic(ellipsoid.semi_major_axis_m, ellipsoid.flattening())
+      .Inverse(from.latitude, from.longitude, to.latitude, to.longitude, metres);
+  return metres;
 }
 
 TileGrid scaled(const TileGrid& grid, GroundScale scale) {

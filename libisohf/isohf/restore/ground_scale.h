@@ -2,6 +2,7 @@
 
 #include "isohf/lattice.h"
 #include "isohf/metadata.h"
+#include "isohf/projection.h"
 
 namespace isohf {
 
@@ -12,6 +13,9 @@ struct GroundScale {
   double z = 1.0;
 };
 [[nodiscard]] GroundScale ground_scale(const Metadata& metadata);
+
+/// Metres between two places on the body of an archive's source, along its ellipsoid.
+[[nodiscard]] double ground_distance_m(const Metadata& metadata, GeoPoint from, GeoPoint to);
 
 /// Whether the archive's world is its source's degrees.
 [[nodiscard]] bool is_in_degrees(const Metadata& metadata);

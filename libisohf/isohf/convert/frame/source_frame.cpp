@@ -269,13 +269,14 @@ SourceFrame make_source_frame(const SourceInfo& info, const GroundRequest& reque
   if (request.wrap_x) {
     const ReferenceMap* const map = request.source_map.get();
     const std::optional<double> turn = turn_of_coordinates(info, map);
-    if (!turn) {
+    if (!turn && (place.has_origin || place.unit != HorizontalUnit::kUnknown)) {
       refuse_source(
           info.path +
-          ": `wrap_x` joins columns of an input in degrees, or on a map whose meridians are evenly spaced columns; "
-          "this one's are not; leave the option out, or bring it to degrees (gdalwarp)");
+          ": `wrap_x` joins columns of an input in degrees, on a map whose meridians are evenly spaced columns, or "
+          "without a place; this one's are not; leave the option out, or bring it to degrees (gdalwarp)");
     }
-    if (closure_of(info, map) != Closure::kClosed) {
+    // Without a place it is a pattern that goes on with its first column behind its last.
+    if (turn && closure_of(info, map) != Closure::kClosed) {
       const bool in_degrees = place.unit == HorizontalUnit::kDegree;
       refuse_source(fmt::format(
           "{}: `wrap_x` needs columns all the way round, {}; this input's {} columns {:.12g} apart make {:.12g}",
