@@ -138,5 +138,36 @@ TEST_F(ShadeTest, RefusesWhatIsOutOfRangeAndStopsWhereCancelled) {
   EXPECT_EQ(code_of({}, job), ErrorCode::kCancelled);
 }
 
+TEST(ShadeCancel, StopsAmongThePixelsOfOneTile) {
+  const test::TemporaryFolder folder;
+  test::MemorySource<float> source(SampleType::kFloat32, 12, 10,
+                                   [](std::int64_t c, std::int64_t r) { return static_cast<double>(c + r); });
+  ConvertOptions made;
+  made.plan.tiles = {{1, 1}};
+  (void)convert(source, folder / "tile.isohf", made);
+  const ArchiveReader archive(folder / "tile.isohf");
+  ShadeOptions options;
+  options.kind = ShadeKind::kHillshade;
+  options.size = GridSize{8192, 6144};  // more than are drawn at once
+  std::atomic<bool> cancel = false;
+  Job job;
+  job.cancel = &cancel;
+  ErrorCode code = ErrorCode::kWarning;  // none
+  int taken = 0;
+  try {
+    (void)shade_rows(
+        archive, options,
+        [&](std::span<const std::byte>) {
+          ++taken;
+          cancel = true;
+        },
+        job);
+  } catch (const Error& error) {
+    code = error.code();
+  }
+  EXPECT_EQ(code, ErrorCode::kCancelled);
+  EXPECT_EQ(taken, 1);
+}
+
 }  // namespace
 }  // namespace isohf

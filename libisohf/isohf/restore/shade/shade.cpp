@@ -549,7 +549,8 @@ class ShadeRenderer {
     for (std::int64_t row = first; row < points.last / z_.per_pixel(); ++row) extend(pixel_row(row));
   }
 
-  /// Work on blocks of rows and columns of pixels, on all threads.
+  /// Work on blocks of rows and columns of pixels, on all threads. Throws Error{kCancelled}: one tile may have pixels
+  /// for minutes.
   template <typename Work>
   void for_each_block(std::int64_t first, std::int64_t end, const Work& work) const {
     // Of so many lattice columns that a few rows of their vertices are little.
@@ -558,6 +559,7 @@ class ShadeRenderer {
     const std::int64_t across = (size_.first + width - 1) / width;
     const std::int64_t down = (end - first + kBlockRows - 1) / kBlockRows;
     oneapi::tbb::parallel_for(std::int64_t{0}, across * down, [&](std::int64_t block) {
+      job_.throw_if_cancelled();
       const std::int64_t row = first + block / across * kBlockRows;
       const std::int64_t column = block % across * width;
       work(Run{row, std::min(row + kBlockRows, end)}, Run{column, std::min(column + width, size_.first)});
