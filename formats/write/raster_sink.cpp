@@ -19,20 +19,36 @@ namespace {
 struct Writer {
   Format format;
   std::unique_ptr<RasterEncoder> (*encode)(OutputFile& out, const RasterSpec& spec);
-  bool has_signature;  ///< by which its files are known; others begin in any way
+  bool has_signature;                             ///< by which its files are known; others begin in any way
+  double (*least_bytes)(const RasterSpec& spec);  ///< of a sample in the file
 };
+
+double plain_bytes(const RasterSpec& spec) {
+  return static_cast<double>(size_bytes(spec.sample_type));
+}
+/// A digit and what parts it from the next.
+double text_bytes(const RasterSpec& /*spec*/) {
+  return 2.0;
+}
+/// Deflate's longest match of 258 bytes takes 2 bits.
+double deflated_bytes(const RasterSpec& spec) {
+  return plain_bytes(spec) * 2.0 / (8.0 * 258.0);
+}
+double packed_bytes(const RasterSpec& spec) {
+  return spec.compress ? deflated_bytes(spec) : plain_bytes(spec);
+}
 
 const std::vector<Writer>& writers() {
   static const std::vector<Writer> table = {
-      {{"GeoTIFF", {".tif", ".tiff"}, tiff_library, "samples of any type"}, encode_tiff, true},
-      {{"OpenEXR", {".exr"}, exr_library, "float16, float32, uint32"}, encode_exr, true},
-      {{"PNG", {".png"}, png_library, "uint8, uint16"}, encode_png, true},
-      {{"SRTM HGT", {".hgt"}, nullptr, "int16; 1201x1201, 3601x3601 or 1801x3601"}, encode_hgt, false},
-      {{"ESRI ASCII grid", {".asc"}, nullptr, "samples of any type"}, encode_asc, true},
-      {{"GridFloat", {".flt"}, nullptr, "float32; with .hdr"}, encode_flt, false},
-      {{"raw 16 bit", {".r16", ".raw"}, nullptr, "uint16; with .json"}, encode_r16, false},
-      {{"raw 32 bit", {".r32"}, nullptr, "float32; with .json"}, encode_r32, false},
-      {{"NumPy", {".npy"}, nullptr, "samples of any type"}, encode_npy, true},
+      {{"GeoTIFF", {".tif", ".tiff"}, tiff_library, "samples of any type"}, encode_tiff, true, packed_bytes},
+      {{"OpenEXR", {".exr"}, exr_library, "float16, float32, uint32"}, encode_exr, true, packed_bytes},
+      {{"PNG", {".png"}, png_library, "uint8, uint16"}, encode_png, true, deflated_bytes},
+      {{"SRTM HGT", {".hgt"}, nullptr, "int16; 1201x1201, 3601x3601 or 1801x3601"}, encode_hgt, false, plain_bytes},
+      {{"ESRI ASCII grid", {".asc"}, nullptr, "samples of any type"}, encode_asc, true, text_bytes},
+      {{"GridFloat", {".flt"}, nullptr, "float32; with .hdr"}, encode_flt, false, plain_bytes},
+      {{"raw 16 bit", {".r16", ".raw"}, nullptr, "uint16; with .json"}, encode_r16, false, plain_bytes},
+      {{"raw 32 bit", {".r32"}, nullptr, "float32; with .json"}, encode_r32, false, plain_bytes},
+      {{"NumPy", {".npy"}, nullptr, "samples of any type"}, encode_npy, true, plain_bytes},
   };
   return table;
 }
@@ -44,6 +60,7 @@ std::string lower_extension(const std::string& path) {
 }
 
 const Writer& writer_for(const std::string& path) {
+  if (path == "-") static_cast<void>(output_place(path, true));  // says why before the extension is looked at
   const std::string extension = lower_extension(path);
   for (const Writer& writer : writers()) {
     for (const char* known : writer.format.extensions) {
@@ -188,6 +205,7 @@ std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterS
     const Writer& writer = writer_for(path);
     check(spec);
     check_target(path, writer, spec.overwrite);
+    check_raster_room(path, spec);
     auto file = std::make_unique<OutputFile>(path, OutputFile::Options{spec.overwrite});
     auto sidecars = begin_sidecars(path, spec);
     auto encoder = writer.encode(*file, spec);
@@ -199,8 +217,16 @@ std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterS
 
 void check_raster_target(const std::string& path, bool overwrite) {
   try {
-    if (path == "-") static_cast<void>(output_place(path, overwrite));  // says so before the extension is looked at
     check_target(path, writer_for(path), overwrite);
+  } catch (const Error& error) {
+    throw error.within(path);
+  }
+}
+
+void check_raster_room(const std::string& path, const RasterSpec& spec, std::int64_t count) {
+  try {
+    const double samples = static_cast<double>(spec.width) * static_cast<double>(spec.height) * spec.channels;
+    require_room(path, static_cast<double>(count) * samples * writer_for(path).least_bytes(spec));
   } catch (const Error& error) {
     throw error.within(path);
   }

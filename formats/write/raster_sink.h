@@ -65,6 +65,10 @@ class RasterSink {
 /// Refuses a name that create_raster would refuse, before any work: Error naming the path.
 void check_raster_target(const std::string& path, bool overwrite);
 
+/// Refuses rasters, `count` of them like `path`, that the file system surely has no room for, before any work: Error{kIo}
+/// naming the path. What is compressed may become as small as its compression can make it.
+void check_raster_room(const std::string& path, const RasterSpec& spec, std::int64_t count = 1);
+
 /// The extensions that create_raster knows: ".tif", ...
 [[nodiscard]] const std::vector<std::string>& writable_extensions();
 

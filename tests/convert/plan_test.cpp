@@ -145,6 +145,9 @@ TEST(Plan, ContradictionsAndNonsenseAreRefused) {
   request = {};
   request.spacing = 1e-12;
   refused(request);
+  request = {};
+  request.density = 1e9;
+  refused(request);
   EXPECT_THROW((void)make_plan(raster(1, 100), {}), Error);
   EXPECT_THROW((void)make_plan(raster(100, 1), {}), Error);
 }

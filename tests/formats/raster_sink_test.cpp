@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <random>
 
@@ -510,6 +511,26 @@ TEST(RasterSink, ReportsADiskThatIsFull) {
       EXPECT_FALSE(std::filesystem::exists(folder / (name + ".part")));
     }
   }
+}
+
+TEST(RasterSink, RefusesWhatNoDiskHasRoomForAndLeavesNothing) {
+  const TemporaryFolder folder;
+  constexpr std::int64_t kSide = std::numeric_limits<std::int32_t>::max();
+  for (const std::string name : {"a.npy", "a.flt", "a.r32", "a.asc", "a.tif", "a.exr"}) {
+    for (const bool compress : {false, true}) {
+      RasterSpec spec = spec_of(kSide, kSide, SampleType::kFloat32);
+      spec.compress = compress;
+      const Error error = error_of([&] { (void)create_raster(folder / name, spec); });
+      EXPECT_EQ(error.code(), ErrorCode::kIo) << error.what();
+      EXPECT_THAT(error.what(), HasSubstr(folder / name));
+      EXPECT_THAT(error.what(), HasSubstr("B free in "));
+    }
+  }
+  EXPECT_THAT(folder.names(), testing::IsEmpty());
+  // Together where one alone would fit.
+  RasterSpec spec = spec_of(1, 1, SampleType::kFloat32);
+  EXPECT_NO_THROW(check_raster_room(folder / "a.r32", spec));
+  EXPECT_EQ(error_of([&] { check_raster_room(folder / "a.r32", spec, std::int64_t{1} << 60); }).code(), ErrorCode::kIo);
 }
 
 TEST(RasterSink, NeverLeavesOldSamplesBesideANewDescription) {

@@ -12,6 +12,7 @@
 #include "commands/command.h"
 #include "commands/export_tiles.h"
 #include "formats/decorate/cropped_source.h"
+#include "isohf/archive/metadata/part_record.h"
 #include "isohf/base/file.h"
 #include "isohf/error.h"
 #include "isohf/restore/sample_grids.h"
@@ -194,12 +195,13 @@ class Exporter {
       const double south = static_cast<double>(row * (grid_.cut.rows - grid_.cut.overlap)) * part.spacing_z;
       part.first_z += part.system ? -south : south;  // northings, and world z
       RasterSpec spec = raster_spec(archive_.metadata(), part, mapping, void_value);
-      if (grid_.cut.asked && !(spec.georeference && spec.georeference->has_origin)) {
-        // Tiles of no known place lie beside each other, from the archive's North-West corner on.
+      if (says_place() && !(spec.georeference && spec.georeference->has_origin)) {
+        // Of no known place, it lies where it does from the archive's North-West corner on.
         if (!spec.georeference) spec.georeference.emplace().registration = Registration::kPoint;
-        spec.georeference->has_origin = true;
-        spec.georeference->origin_x = part.first_x;
-        spec.georeference->origin_y = -part.first_z;
+        Georeference& place = *spec.georeference;
+        place.has_origin = true;
+        place.origin_x = part.first_x * (place.spacing_x / part.spacing_x);
+        place.origin_y = -part.first_z * (place.spacing_y / part.spacing_z);
       }
       spec.overwrite = options_.raster.overwrite;
       spec.scratch = scratch_of(options_.work);
@@ -227,6 +229,13 @@ class Exporter {
   std::vector<std::string> written;  ///< those beside them as well
 
  private:
+  /// Also of an archive without a place: what lies beside others must say where, and grids always do. All of it in
+  /// another format has none, as its source had.
+  [[nodiscard]] bool says_place() const {
+    const RasterKind kind = raster_kind(options_.raster.output);
+    return grid_.cut.asked || options_.bbox || part_record(archive_.metadata()) || kind == RasterKind::kAsc ||
+           kind == RasterKind::kFlt;
+  }
   Job job(const char* stage) {
     Job made = job_from(options_.work, display_);
     made.progress = [this, stage](const Progress& at) { display_.update(stage, at.unit, at.done, at.total); };
@@ -279,9 +288,18 @@ class Exporter {
 int run(const ExportOptions& options) {
   ArchiveReader archive = open_with_source(options.raster.archive);
   const ExportGrid grid = asked_grid(options, archive);
-  for (const std::string& file : ExportTiles(options.raster.output, grid.cut, grid.samples.width).names()) {
+  RasterSpec spec;
+  spec.width = grid.cut.columns;
+  spec.height = grid.cut.rows;
+  spec.sample_type = options.type.value_or(default_type(options.raster.output));
+  spec.overwrite = options.raster.overwrite;
+  check_raster_room(options.raster.output, spec, grid.cut.across * grid.cut.down);
+  const std::vector<std::string> names = ExportTiles(options.raster.output, grid.cut, grid.samples.width).names();
+  for (const std::string& file : names) {
     check_raster_output({options.raster.archive}, file, options.raster.overwrite);
   }
+  // What the format does not hold is refused before elevations are looked at.
+  (void)create_raster(names.front(), spec);
   Exporter exporter(options, archive, grid);
   WorkArena arena(options.work.threads);
   arena.execute([&] { exporter.run(); });

@@ -324,6 +324,12 @@ int run(const RestoreOptions& options) {
   // In the archive's own system the samples are its source's.
   is_lossless =
       is_lossless && (options.raster.system.empty() || (!grid.goes_by_places() && !is_warped(archive.metadata())));
+  RasterSpec file;
+  file.width = grid.width;
+  file.height = grid.height;
+  file.sample_type =
+      restored_type(options.raster.output, sample_type_from_string(archive.metadata().source.sample_type));
+  check_raster_room(options.raster.output, file);
   Restored restored;
   try {
     arena.execute([&] { restored = Restorer(options, archive, grid).run(is_lossless); });

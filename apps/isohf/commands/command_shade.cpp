@@ -264,6 +264,7 @@ int run(ShadeCommand options) {
 
   const std::vector<Frame> frames = frames_of(options, archive);
   for (const Frame& frame : frames) check_raster_output({options.archive}, frame.output, options.overwrite);
+  check_raster_room(options.output, spec, static_cast<std::int64_t>(frames.size()));
   ShadeReport report;
   ordered_json files = ordered_json::array();
   ordered_json pictures = ordered_json::array();

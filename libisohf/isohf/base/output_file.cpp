@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <filesystem>
+#include <iterator>
 #include <system_error>
 
 #include "isohf/error.h"
@@ -40,6 +41,14 @@ File open_locked(const std::string& path) {
     if (file.is_at_path()) return file;
   }
   throw Error(ErrorCode::kIo, fmt::format("another process is writing {}; wait for it, or choose another name", path));
+}
+
+/// "12.3 MB", powers of 1000.
+std::string in_bytes(double bytes) {
+  constexpr const char* kUnits[] = {"bytes", "kB", "MB", "GB", "TB", "PB", "EB"};
+  std::size_t unit = 0;
+  for (; bytes >= 999.5 && unit + 1 < std::size(kUnits); bytes /= 1000.0) ++unit;
+  return fmt::format("{:.3g} {}", bytes, kUnits[unit]);
 }
 
 std::vector<std::byte> room_for(std::size_t bytes) {
@@ -82,6 +91,19 @@ std::string output_place(const std::string& path, bool overwrite) {
   if (!overwrite) throw Error(ErrorCode::kInvalidArgument, {"", "exists", "", "`overwrite` replaces it"});
   check_folder(folder_of(place));
   return place;
+}
+
+void require_room(const std::string& path, double least_bytes) {
+  std::error_code failure;
+  const std::string folder = folder_of(fs::weakly_canonical(fs::absolute(path, failure), failure).string());
+  const fs::space_info space = fs::space(folder, failure);
+  if (failure || space.capacity == 0) return;
+  const std::uintmax_t part = fs::file_size(path + ".part", failure);
+  const double free = static_cast<double>(space.available) + (failure ? 0.0 : static_cast<double>(part));
+  if (least_bytes <= free) return;
+  throw Error(ErrorCode::kIo, {"", fmt::format("{} free in {}", in_bytes(free), folder),
+                               fmt::format("at least {}, which the output takes", in_bytes(least_bytes)),
+                               "ask for fewer samples, make room, or choose another folder"});
 }
 
 std::vector<std::byte> head_of_file(const std::string& path, std::size_t most_bytes) {

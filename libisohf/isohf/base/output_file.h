@@ -18,6 +18,11 @@ namespace isohf {
 /// link to nothing; a file that exists, without `overwrite`; Error{kIo}: its folder is missing or may not be written.
 [[nodiscard]] std::string output_place(const std::string& path, bool overwrite);
 
+/// Looks, before any work, whether an output has room that takes so many bytes at least. Throws, without the path,
+/// Error{kIo} where its file system has less; what NAME.part takes already counts as free, and what cannot be told as
+/// enough.
+void require_room(const std::string& path, double least_bytes);
+
 /// What a file that exists holds in its first bytes, up to `most_bytes`; nothing where there is no regular file. Throws,
 /// without the path, Error{kIo} where it cannot be read.
 [[nodiscard]] std::vector<std::byte> head_of_file(const std::string& path, std::size_t most_bytes);

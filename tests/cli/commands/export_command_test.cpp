@@ -324,6 +324,56 @@ TEST_F(ExportCommand, KeepsWhatTookAnOldFilesPlaceWhereALaterTileFails) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "t_x1_y0.npy"));
 }
 
+TEST_F(ExportCommand, RefusesASampleTypeBeforeItWarnsOfAnything) {
+  const RunResult result = run_isohf({"export", folder_ / "coast.isohf", folder_ / "t.exr", "--type", "u16"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, testing::StartsWith("isohf: " + folder_ / "t.exr" + ": "));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+}
+
+TEST_F(ExportCommand, RefusesWhatNoDiskHasRoomForBeforeAnyWork) {
+  // The second would look for the range of elevations first.
+  for (const char* name : {"huge.npy", "huge.r16"}) {
+    EXPECT_THAT(refused({folder_ / name, "--size", "100000000x100000000"}, 1),
+                HasSubstr("PB, which the output takes; ask for fewer samples"));
+  }
+  EXPECT_THAT(refused({folder_ / "huge.r16", "--tiles", "60000x60000", "--tile-size", "10000"}, 1),
+              HasSubstr("which the output takes"));
+  const RunResult restored =
+      run_isohf({"restore", folder_ / "coast.isohf", folder_ / "huge.npy", "--size", "100000000x100000000"});
+  EXPECT_EQ(restored.exit_code, 1);
+  EXPECT_THAT(restored.err, HasSubstr("which the output takes"));
+  EXPECT_EQ(folder_.names(), std::vector<std::string>{"coast.isohf"});
+}
+
+TEST(ExportWithoutAPlace, PutsPartsTilesAndGridsBesideEachOther) {
+  const TemporaryFolder folder;
+  const std::string peaks = ISOHF_SOURCE_DIR "/testdata/peaks_256x256_uint16.png";
+  const auto done = [](std::vector<std::string> arguments) {
+    const RunResult result = run_isohf(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return json::parse(result.out, nullptr, false);
+  };
+  (void)done({"convert", peaks, folder / "whole.isohf", "--sample-spacing", "2", "--tiles", "2x2", "--json"});
+  (void)done({"extract", folder / "whole.isohf", "-o", folder / "part.isohf", "--tiles", "1:2,1:2", "--json"});
+  for (const std::string ending : {".asc", ".flt", ".r16", ".tif", ".png"}) {
+    for (const std::string name : {"whole", "part"}) {
+      SCOPED_TRACE(name + ending);
+      const json summary = done({"export", folder / (name + ".isohf"), folder / (name + ending), "--json"});
+      const Georeference place = read_raster(folder / (name + ending)).info.georeference;
+      const bool has_none = name == "whole" && ending != ".asc" && ending != ".flt";  // as its source
+      EXPECT_EQ(place.has_origin, !has_none);
+      if (has_none) continue;
+      EXPECT_NEAR(place.origin_x, summary.at("first_sample").at("x"), 1e-9);
+      EXPECT_NEAR(place.origin_y, -summary.at("first_sample").at("z").get<double>(), 1e-9);
+      EXPECT_EQ(place.origin_x > 100.0, name == "part") << place.origin_x;
+    }
+  }
+  (void)done({"export", folder / "part.isohf", folder / "tile.asc", "--tiles", "2x2", "--json"});
+  EXPECT_NEAR(read_raster(folder / "tile_x0_y0.asc").info.georeference.origin_x,
+              read_raster(folder / "part.asc").info.georeference.origin_x, 2.0);
+}
+
 TEST(ExportVoids, AreToldWhereAFileOfNumbersAloneHoldsThem) {
   const TemporaryFolder folder;
   ASSERT_EQ(run_isohf({"convert", kVoids, folder / "a.isohf", "-q"}).exit_code, 0);

@@ -41,6 +41,8 @@ constexpr double kLargestSide = 1.5;
 /// Densities that nobody means unless they ask for them.
 constexpr double kThinDensity = 0.5;
 constexpr double kThickDensity = 2.0;
+/// The most that is done for those who ask: a tile then holds a small part of the ground between four samples.
+constexpr double kMostDensityAsked = 1 << 20;
 
 [[noreturn]] void refuse(const std::string& why) {
   throw Error(ErrorCode::kInvalidArgument, why);
@@ -357,6 +359,12 @@ Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
       .outside = request.outside};
   const TileShape& shape = plan.grid.shape();
   plan.density = frame.spacing_x * frame.spacing_z / (2.0 * plan.grid.sigma_x() * plan.grid.sigma_z());
+  if (plan.density > kMostDensityAsked) {
+    refuse(
+        fmt::format("the lattice has {:.3g} vertices for one of the input's samples, at most {} are possible; use a "
+                    "larger `spacing`, a smaller `density` or fewer `tiles`",
+                    plan.density, kMostDensityAsked));
+  }
   plan.band_rows = band_rows(plan);
   plan.lattice_samples = shape.stored_vertex_count() * plan.grid.tile_count();
   constexpr double kTypicalBits = 5.0;
