@@ -278,6 +278,20 @@ TEST_F(Resuming, AFilterOfAFileThatChangedIsAnotherJob) {
   EXPECT_THAT(run(resumed).err, testing::HasSubstr("fir.txt was changed after it was written"));
 }
 
+TEST(EachOnAFullDisk, BeginsNoOtherFileAndSaysSoOnce) {
+  const TemporaryFolder folder;
+  const std::string raster = ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif";
+  for (const char* name : {"a.tif", "b.tif", "c.tif", "d.tif"}) fs::copy_file(raster, folder / name);
+  const RunResult result =
+      run_program({"/usr/bin/env", "LD_PRELOAD=" ISOHF_FAULT_INJECTOR, "ISOHF_FAULT=ftruncate 28 1+", isohf_path(),
+                   "convert", "--each", folder.path(), "--out-dir", folder / "out", "--keep-going", "-j", "2"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, testing::HasSubstr("a.isohf: "));
+  EXPECT_THAT(result.err, testing::HasSubstr(std::strerror(ENOSPC)));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_THAT(result.out, testing::StartsWith("4 files: 0 converted, 1 failed, 3 not done in "));
+}
+
 INSTANTIATE_TEST_SUITE_P(All, Faults, testing::ValuesIn(jobs()), [](const auto& test) { return test.param.name; });
 
 }  // namespace

@@ -156,8 +156,31 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
   return text;
 }
 
-/// Whether OUTPUT is what --resume would come to. Throws Error{kInvalidArgument} where it is another archive, unless it
-/// may be replaced.
+/// Why a file is no complete archive, for a message that names it.
+std::string incomplete(const std::string& path, const Error& error) {
+  const std::string why = error.what();
+  return "is no complete archive: " + (why.starts_with(path + ": ") ? why.substr(path.size() + 2) : why);
+}
+
+/// What a run throws away that does not resume: how much an interrupted one left. Empty where there is nothing, or
+/// another run is writing it.
+std::string note_of_dropped_part(const ConvertCommandOptions& options) {
+  if (options.convert.resume) return {};
+  try {
+    const std::string path = output_place(options.output, true) + ".part";
+    File part(path, File::Mode::kRead);
+    if (!part.try_lock() || part.size_bytes() == 0) return {};
+    return fmt::format(
+        "{}: {} of an interrupted run are thrown away; --resume goes on with a part of the same input "
+        "and options",
+        path, describe_bytes(part.size_bytes()));
+  } catch (const Error&) {  // there is no part
+    return {};
+  }
+}
+
+/// Whether OUTPUT is what --resume would come to. Throws Error{kInvalidArgument} where it is another archive,
+/// Error{kCorrupt, ...} where it is none, unless it may be replaced.
 bool is_complete(const ConvertCommandOptions& options, const Prepared& prepared) {
   std::error_code none;
   if (!options.convert.resume || !std::filesystem::exists(options.output, none)) return false;
@@ -166,6 +189,7 @@ bool is_complete(const ConvertCommandOptions& options, const Prepared& prepared)
   for (const std::string& file : prepared.files) {
     if (std::filesystem::last_write_time(file, none) > written) difference = file + " was changed after it was written";
   }
+  ErrorCode code = ErrorCode::kInvalidArgument;
   try {
     if (difference.empty()) {
       const SourceInfo& info = prepared.source->info();
@@ -174,7 +198,8 @@ bool is_complete(const ConvertCommandOptions& options, const Prepared& prepared)
       if (!difference.empty()) difference = "was made otherwise: " + difference;
     }
   } catch (const Error& error) {
-    difference = std::string("is no complete archive: ") + error.what();
+    difference = incomplete(options.output, error);
+    code = error.code();
   }
   if (difference.empty()) {
     // A run that was killed between its last two steps left its journal.
@@ -184,7 +209,7 @@ bool is_complete(const ConvertCommandOptions& options, const Prepared& prepared)
     return true;
   }
   if (options.convert.overwrite) return false;
-  throw Error(ErrorCode::kInvalidArgument, {options.output, difference, "", "--overwrite makes it anew"});
+  throw Error(code, {options.output, difference, "", "--overwrite makes it anew"});
 }
 
 ordered_json json_of_complete(const std::string& input, const std::string& output, const char* status) {
@@ -254,8 +279,7 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
       return skipped(file);
     } catch (const Error& error) {
       if (!options.convert.overwrite) {
-        throw Error(error.code(), {file.output, std::string("is no complete archive: ") + error.what(), "",
-                                   "--overwrite replaces it"});
+        throw Error(error.code(), {file.output, incomplete(file.output, error), "", "--overwrite replaces it"});
       }
     }
   }
@@ -284,10 +308,11 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
     const MemoryPlan memory = plan_memory(*prepared.source, plan, options.convert, job);
     if (share.memory_bytes != 0 && memory.bytes > share.memory_bytes) return std::nullopt;
   }
+  std::string note = note_of_dropped_part(options);
   ConvertSummary summary = convert(*prepared.source, file.output, options.convert, job);
   const ordered_json document =
       document_of(options, summary, counts_of_voids(*prepared.source, summary.source_voids), std::nullopt);
-  return EachResult{EachResult::State::kConverted, json_line(document), std::move(summary.warnings)};
+  return EachResult{EachResult::State::kConverted, json_line(document), std::move(summary.warnings), std::move(note)};
 }
 
 int run_each(const ConvertCommandOptions& options) {
@@ -347,6 +372,7 @@ int run(ConvertCommandOptions options) {
       return accuracy->surface;
     };
   }
+  if (const std::string note = note_of_dropped_part(options); !note.empty() && !common.quiet) print_note(note);
   const ConvertSummary summary = [&] {
     try {
       return convert(source, options.output, options.convert, job);

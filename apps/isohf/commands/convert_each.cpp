@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <condition_variable>
 #include <exception>
 #include <filesystem>
@@ -14,6 +15,7 @@
 #include <variant>
 
 #include "formats/files/text.h"
+#include "isohf/base/file.h"
 #include "options/describe.h"
 #include "options/input_files.h"
 #include "output/json_output.h"
@@ -37,6 +39,13 @@ std::string archive_name(const std::string& input) {
   const std::string ending = lower_case(name.extension().string());
   const fs::path bare = name.stem();
   return ((ending == ".gz" || ending == ".zip") && has_raster_name(bare.string()) ? bare.stem() : bare).string();
+}
+
+/// Whether there was no room for an archive: nor is there for the next one.
+bool is_disk_full(const EachFile& file, const Error& error) {
+  const std::string what = error.what();
+  return error.code() == ErrorCode::kIo && what.starts_with(file.output) &&
+         (what.find(reason(ENOSPC)) != std::string::npos || what.find(reason(EDQUOT)) != std::string::npos);
 }
 
 /// Lets many in side by side, or one alone, who need not wait for more than those that are in.
@@ -84,8 +93,9 @@ class Batch {
     const std::lock_guard lock(mutex_);
     const bool failed = !std::holds_alternative<EachResult>(outcome);
     if (failed && !options_.keep_going) stopped_ = true;
-    if (const auto* error = std::get_if<Error>(&outcome); error != nullptr && error->code() == ErrorCode::kCancelled) {
-      stopped_ = interrupted_ = true;
+    if (const auto* error = std::get_if<Error>(&outcome); error != nullptr) {
+      if (error->code() == ErrorCode::kCancelled) stopped_ = interrupted_ = true;
+      if (is_disk_full(files_[number], *error)) stopped_ = true;
     }
     if (std::holds_alternative<std::exception_ptr>(outcome)) {
       stopped_ = true;
@@ -152,7 +162,8 @@ class Batch {
        : result->state == State::kComplete ? complete_
        : result->state == State::kSkipped  ? skipped_
                                            : busy_) += 1;
-      if (!result->warnings.empty()) display_.clear();
+      if (!result->warnings.empty() || !result->note.empty()) display_.clear();
+      if (!result->note.empty() && !common_.quiet) print_note(result->note);
       for (const Warning& warning : result->warnings) {
         const bool names_it = warning.find(file.input) != std::string::npos;
         print_warning(names_it ? warning : warning.reworded(file.input + ": " + warning));
@@ -161,6 +172,10 @@ class Batch {
     } else {
       const Error& error = std::get<Error>(outcome);
       if (error.code() == ErrorCode::kCancelled) return;
+      // Those that were being made beside the first one that found no room are told of by its line.
+      const bool is_full = is_disk_full(file, error);
+      if (is_full && disk_full_) return;
+      disk_full_ = disk_full_ || is_full;
       display_.clear();
       failed_.push_back(error);
       print_error_line(error);
@@ -189,6 +204,7 @@ class Batch {
   std::vector<Error> failed_;
   bool stopped_ = false;
   bool interrupted_ = false;
+  bool disk_full_ = false;  ///< and told
   std::exception_ptr fault_;
 };
 

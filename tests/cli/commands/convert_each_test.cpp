@@ -123,6 +123,28 @@ TEST_F(ConvertEach, TakesAnIncompleteFileOfThatNameForAnError) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("b.isohf: is no complete archive: "));
   EXPECT_THAT(result.out, testing::StartsWith("6 files: 0 converted, 5 skipped, 1 failed in "));
+  // No argument is at fault, and the file's name need not be said twice.
+  const RunResult resumed = each({"--resume"});
+  EXPECT_EQ(resumed.exit_code, 1);
+  for (const std::string& line : {result.err, resumed.err}) {
+    const std::size_t name = line.find("b.isohf: is no complete archive: ");
+    ASSERT_NE(name, std::string::npos) << line;
+    EXPECT_EQ(line.find("b.isohf", name + 1), std::string::npos) << line;
+  }
+}
+
+TEST_F(ConvertEach, SaysThatItThrowsAwayWhatAnInterruptedRunLeftAsASingleRunDoes) {
+  fs::create_directories(out_);
+  const std::string told = "isohf: " + out_ +
+                           "/b.isohf.part: 4 bytes of an interrupted run are thrown away; --resume goes on with a part "
+                           "of the same input and options\n";
+  const auto leave = [&] { write_text(out_ + "/b.isohf.part", "left"); };
+  leave();
+  EXPECT_EQ(each().err, told);
+  leave();
+  EXPECT_EQ(run_isohf({"convert", in_ + "/b.asc", out_ + "/b.isohf", "--overwrite"}).err, told);
+  leave();
+  EXPECT_EQ(each({"--overwrite", "-q"}).err, "");
 }
 
 TEST_F(ConvertEach, StopsAtABadFileOrKeepsGoing) {
