@@ -51,6 +51,7 @@ TEST(Place, HasTheHeightsOfTheTriangles) {
   const Place place = probe(source, ground, {123.0, 45.0});
   ASSERT_TRUE(place.elevation);
   EXPECT_DOUBLE_EQ(*place.elevation, *ground.height({123.0, 45.0}, source.covered()));
+  EXPECT_EQ(json_of(place).at("elevation").get<double>(), *place.elevation) << "rounded is what people read";
   EXPECT_FALSE(probe(source, ground, {-1.0, 45.0}).elevation);
   EXPECT_TRUE(json_of(probe(source, ground, {-1.0, 45.0})).at("elevation").is_null());
   const Profile profile = profile_between(source, ground, {10.0, 10.0}, {250.0, 190.0});

@@ -101,6 +101,7 @@ std::optional<ShardCommand> parse_shards(const Arguments& arguments, bool scans)
   add_memory_options(line, "that of -o", options.work);
   add_common_options(line, options.common);
   line.footer(scans ? kScanFooter : kShardFooter);
+  line.settled("convert", "is settled by the plan; isohf plan takes it");
   if (!line.parse(arguments)) return std::nullopt;
   line.require("PLAN (--plan)", options.plan);
   line.require(fmt::format("{} (-o)", output), options.output);

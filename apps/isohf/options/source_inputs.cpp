@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <span>
 
@@ -91,12 +92,39 @@ void add_mosaic_options(CommandLine& line, SourceInputs& inputs) {
   line.flag("--recursive", "Look into the folders of a folder as well", inputs.recursive);
 }
 
+namespace {
+
+/// ".05" and "0.050" are one number, and so are they in a list or a range: the same values, the same bytes.
+std::string with_plain_numbers(const std::string& text) {
+  std::string plain;
+  for (std::size_t from = 0; from <= text.size();) {
+    const std::size_t to = std::min(text.find_first_of(",:", from), text.size());
+    const std::string word = text.substr(from, to - from);
+    try {
+      plain += fmt::format("{}", parse_number(word));
+    } catch (const Error&) {  // "nan", or with a unit
+      plain += word;
+    }
+    if (to < text.size()) plain += text[to];
+    from = to + 1;
+  }
+  return plain;
+}
+
+bool takes_numbers(const std::string& option) {
+  constexpr std::array kThese = {"--nodata",  "--valid-range", "--fill-distance",
+                                 "--z-scale", "--z-offset",    "--sample-spacing"};
+  return std::find(kThese.begin(), kThese.end(), option) != kThese.end();
+}
+
+}  // namespace
+
 RecordedOptions recorded_options(const CommandLine& line) {
   RecordedOptions recorded;
   for (auto& [name, text] : line.texts_in({"Input", "Several inputs"})) {
     // Neither what files are found by nor what the archive calls them: the same samples, the same bytes.
     const bool says_how = name != "--require-complete" && name != "--source-name" && name != "--recursive";
-    if (says_how) recorded.emplace_back(name.substr(2), text);
+    if (says_how) recorded.emplace_back(name.substr(2), takes_numbers(name) ? with_plain_numbers(text) : text);
   }
   for (auto& [name, text] : line.texts_in({"Ground"})) {
     if (name == "--geoid") recorded.emplace_back("geoid", file_name(text));

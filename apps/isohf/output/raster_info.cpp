@@ -110,6 +110,9 @@ std::string describe_registration(const RasterInfo& raster) {
 
 std::string describe_voids(const SourceInfo& info) {
   std::string text;
+  const bool is_transparency = info.void_values.size() == 1 && !is_floating(info.sample_type) &&
+                               info.valid_min == info.void_values.front() + 1.0 && !std::isfinite(info.valid_max);
+  if (is_transparency) return fmt::format("transparent samples, read as {}", info.void_values.front());
   for (const double value : info.void_values) text += fmt::format("{}, ", value);
   if (is_floating(info.sample_type)) text += "NaN and infinities, ";
   if (std::isfinite(info.valid_min) || std::isfinite(info.valid_max)) {

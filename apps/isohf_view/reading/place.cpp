@@ -52,7 +52,7 @@ std::vector<std::string> lines_of(const Place& place) {
 
 ordered_json json_of(const Place& place) {
   ordered_json json{{"x", place.at.x}, {"z", place.at.z}, {"elevation", nullptr}};
-  if (place.elevation) json["elevation"] = rounded(*place.elevation, place.decimals);
+  if (place.elevation) json["elevation"] = *place.elevation;
   json["unit"] = place.unit.empty() ? ordered_json(nullptr) : ordered_json(place.unit);
   if (place.difference) json["difference"] = *place.difference;
   if (place.map) json["map"] = {place.map->easting, place.map->northing};

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -92,6 +93,21 @@ TEST_F(ConvertCommand, ProgressGoesToStandardErrorInTheFormAskedFor) {
   EXPECT_EQ(last.at("done"), last.at("total"));
   const RunResult verbose = run_isohf({"convert", folder / "a.tif", folder / "3.isohf", "-v"});
   EXPECT_THAT(verbose.err, HasSubstr("isohf: tile grid"));
+}
+
+TEST_F(ConvertCommand, NumbersAreRecordedAsValuesHoweverTheyAreTyped) {
+  const std::string peaks = ISOHF_SOURCE_DIR "/testdata/peaks_256x256_uint16.png";
+  const TemporaryFolder other;
+  std::string first;
+  for (const auto& [scale, range, voids] :
+       {std::array{"0.05", "-10:3000", "7,8.5,nan"}, std::array{".05", "-1e1:3000.0", "+7,8.50,nan"}}) {
+    const RunResult result = run_isohf({"convert", peaks, other / "a.isohf", "--z-scale", scale, "--valid-range", range,
+                                        "--nodata", voids, "--overwrite", "-q"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const std::string bytes = read_file(other / "a.isohf");
+    if (first.empty()) first = bytes;
+    EXPECT_TRUE(bytes == first) << scale;
+  }
 }
 
 TEST_F(ConvertCommand, OverwriteReplaces) {

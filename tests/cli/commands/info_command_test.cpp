@@ -2,10 +2,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <span>
 
+#include "formats/write/raster_sink.h"
 #include "isohf/archive.h"
 #include "support/rasters/plain_tiff.h"
 #include "support/run_program.h"
@@ -40,6 +43,21 @@ TEST_F(InfoCommand, SaysWhatTheArchiveHolds) {
                            "bits a source sample", "sha256 "}) {
     EXPECT_THAT(result.out, HasSubstr(part));
   }
+}
+
+TEST_F(InfoCommand, SaysThatTransparentSamplesAreVoids) {
+  RasterSpec spec;
+  spec.width = 2;
+  spec.height = 2;
+  spec.sample_type = SampleType::kUint8;
+  spec.channels = 4;
+  const auto sink = create_raster(folder / "clear.png", spec);
+  const std::array<std::uint8_t, 16> pixels = {1, 134, 170, 255, 1, 134, 180, 255, 1, 134, 190, 255, 0, 0, 0, 0};
+  sink->write_rows(std::as_bytes(std::span(pixels)));
+  sink->finish();
+  const RunResult result = run_isohf({"info", folder / "clear.png", "--encoding", "mapbox"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("transparent samples, read as -1\n"));
 }
 
 TEST_F(InfoCommand, SaysThatTheSourcesSamplesAreKept) {

@@ -99,7 +99,15 @@ TEST(JsonError, SaysBothSizesOfAFileOfTheWrongSize) {
 TEST(JsonError, SaysTheLeastMemory) {
   const TemporaryFolder folder;
   const Rasters rasters(folder);
-  const json error = error_of({"convert", rasters.plain, rasters.out, "--memory", "1M", "--json"}, 1);
+  const std::vector<std::string> small = {"convert", rasters.plain, rasters.out, "--memory", "1M", "--json", "-j"};
+  const auto on_threads = [&](const std::string& count) {
+    std::vector<std::string> command = small;
+    command.push_back(count);
+    return error_of(command, 1);
+  };
+  EXPECT_THAT(on_threads("3").at("message").get<std::string>(), testing::EndsWith(" or fewer --threads than 3"));
+  const json error = on_threads("1");
+  EXPECT_THAT(error.at("message").get<std::string>(), testing::EndsWith("smaller tiles (--shape, --triangles)"));
   EXPECT_EQ(error.at("code"), "out-of-memory");
   EXPECT_EQ(error.at("found"), "1 MB");
   EXPECT_THAT(error.at("required").get<std::string>(), testing::StartsWith("at least "));

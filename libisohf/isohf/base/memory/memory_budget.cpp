@@ -1,11 +1,13 @@
 #include "isohf/base/memory/memory_budget.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #if defined(__GLIBC__)
 #include <malloc.h>
 #endif
 
 #include <cmath>
+#include <vector>
 
 #include "isohf/base/arena.h"
 #include "isohf/error.h"
@@ -26,12 +28,15 @@ void require_memory(const Job& job, double bytes, double least, const std::strin
   if (job.memory_bytes == 0 || bytes <= static_cast<double>(job.memory_bytes)) return;
   constexpr std::uint64_t kMega = 1000000;
   const auto enough = static_cast<std::uint64_t>(std::ceil(least / static_cast<double>(kMega)));
-  const std::string use = fmt::format("{}fewer `threads` than {}", remedy, threads_of(job));
+  std::vector<std::string> less;
+  if (!remedy.empty()) less.push_back(remedy);
+  if (threads_of(job) > 1) less.push_back(fmt::format("fewer `threads` than {}", threads_of(job)));
+  const std::string use = less.empty() ? "" : fmt::format(", or use {}", fmt::join(less, " or "));
   throw Error(ErrorCode::kOutOfMemory,
-              fmt::format("`memory_bytes` allows {} MB, {} needs at least {} MB; allow that much, or use {}",
+              fmt::format("`memory_bytes` allows {} MB, {} needs at least {} MB; allow that much{}",
                           job.memory_bytes / kMega, what, enough, use),
               {"memory", fmt::format("{} MB", job.memory_bytes / kMega), fmt::format("at least {} MB", enough),
-               "allow that much, or use smaller tiles or fewer threads"});
+               "allow that much" + use});
 }
 
 ScratchFolder scratch_for(const Job& job, double in_memory, double in_scratch, const std::string& what) {
