@@ -230,7 +230,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   add_picture(line, options);
   line.flag("--no-haze", "Leave out the haze towards the far distance", no_haze);
   line.flag("--no-base", "Leave out the block that the ground stands on, and the hatching below voids", no_base);
-  line.flag("--no-overlay", "Leave out the figures on the picture", no_overlay);
+  line.flag("--no-overlay", "Leave out what a window writes over the picture", no_overlay);
   add_light(line, options, time);
   line.group("Work");
   line.option(
@@ -259,6 +259,9 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   needs("--time", options.date.has_value(), "--date");
   if (time) options.date->hours = *time;
   needs("--difference", options.archives.size() == 2, "a second archive");
+  if (options.position && options.look_at && *options.position == *options.look_at) {
+    line.fail("--look-at is the place of --position, which gives no direction; name another place");
+  }
   if (options.difference && !options.mode_given) options.view.mode = ColourMode::kDifference;
   if (!options.probe.empty()) options.action = Options::Action::kProbe;
   options.view.haze = !no_haze;

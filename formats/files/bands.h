@@ -11,7 +11,8 @@
 namespace isohf {
 
 /// What channels of elevations are called, in lower case, the likeliest first.
-inline constexpr std::array kHeightWords = {"height", "elevation", "altitude", "dem", "heightmap", "displacement", "disp"};
+inline constexpr std::array kHeightWords = {"height",    "elevation",    "altitude", "dem",
+                                            "heightmap", "displacement", "disp"};
 /// The first of the bands whose name, but for a unit in brackets, says elevations, as kHeightWords do, else "z"; else the
 /// first.
 [[nodiscard]] std::size_t band_of_heights(const std::vector<std::string>& names);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <string>
 
@@ -95,6 +96,29 @@ TEST_F(Convert, RefusesWhatCallersGetWrong) {
   }
   EXPECT_FALSE(fs::exists(path("wrong.isohf")));
   EXPECT_THROW(ArchiveReader(nullptr, "none"), Error);
+}
+
+/// A texture: its first column comes behind its last.
+TEST_F(Convert, APatternWithoutAPlaceIsJoined) {
+  constexpr std::int64_t kColumns = 64;
+  test::MemorySource<float> pattern(SampleType::kFloat32, kColumns, 48, [](std::int64_t c, std::int64_t r) {
+    return 10.0 * std::sin(2.0 * std::numbers::pi * static_cast<double>(c) / kColumns) + static_cast<double>(r);
+  });
+  ConvertOptions options = small_tiles(Filter::kLimitedCubic);
+  options.plan.ground.wrap_x = true;
+  const ConvertSummary summary = run(pattern, path("a.isohf"), options);
+  EXPECT_TRUE(summary.metadata.wraps_x);
+  EXPECT_NEAR(summary.metadata.grid.world_width(), kColumns, 1e-9) << "a period, not one spacing less";
+  EXPECT_TRUE(verify_archive(path("a.isohf")).passed());
+  const ArchiveReader archive(path("a.isohf"));
+  EXPECT_EQ(check_vertices(archive, pattern).wrong, 0);
+  Surface surface(archive);
+  for (double z = 0.5; z < 47.0; z += 5.0) {
+    EXPECT_EQ(surface.at(WorldPoint{0.0, z}).elevation, surface.at(WorldPoint{double{kColumns}, z}).elevation);
+  }
+  // What has a place is not all the way round because it is wished for.
+  pattern.mutable_info().georeference.has_origin = true;
+  EXPECT_THROW(run(pattern, path("b.isohf"), options), Error);
 }
 
 TEST_F(Convert, RowsAreReadOnceFromNorthToSouth) {

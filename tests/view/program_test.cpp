@@ -48,6 +48,31 @@ TEST_F(ViewProgramTest, WritesScreenshots) {
   }
 }
 
+/// Along the body, not along the map, which is true on two parallels at most.
+TEST_F(ViewProgramTest, MeasuresAlongTheBody) {
+  std::string samples;
+  for (int i = 0; i < 360 * 180; ++i) samples += std::string("\0\0\x20\x41", 4);  // 10.0F
+  test::write_file(path("globe.flt"), samples);
+  test::write_file(path("globe.hdr"),
+                   "ncols 360\nnrows 180\nxllcorner -180\nyllcorner -90\ncellsize 1\nbyteorder LSBFIRST\n");
+  test::write_file(
+      path("globe.prj"),
+      R"(GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["Degree",0.0174532925199433]])");
+  ASSERT_EQ(test::run_program({ISOHF_BIN_DIR "/isohf", "convert", path("globe.flt"), "-o", path("globe.isohf"), "-q"})
+                .exit_code,
+            0);
+  const double degree = 6378137.0 * std::acos(-1.0) / 180.0;  // along the map, which is true on the equator
+  const auto length = [&](double x0, double x1, double z) {
+    const Outcome outcome = run(path("globe.isohf") + " --json --probe " +
+                                fmt::format("{},{},{},{}", x0 * degree, z * degree, x1 * degree, z * degree));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out).at("profile").at("length").get<double>();
+  };
+  EXPECT_NEAR(length(180.0, 190.0, 90.0), 10.0 * degree, 2000.0);
+  // A quarter of the parallel of 60 degrees North, by the great circle: 41.41 degrees of it.
+  EXPECT_NEAR(length(180.0, 270.0, 30.0), 41.41 * degree, 0.01 * 41.41 * degree);
+}
+
 TEST_F(ViewProgramTest, VerifiesGoodAndBadArchives) {
   const Outcome good = run(path("good.isohf") + " --verify");
   EXPECT_EQ(good.exit_code, 0) << good.out << good.err;

@@ -1,7 +1,9 @@
 #include "renderer.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <random>
 
 #include "camera.h"
 #include "gl/offscreen.h"
@@ -51,6 +53,44 @@ TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
   std::size_t green = 0;  // the lowland colours: the terrain is there
   for (std::size_t i = 0; i < pixels.size(); i += 4) green += pixels[i + 1] > pixels[i + 2] ? 1 : 0;
   EXPECT_GT(green, pixels.size() / 4 / 10);
+}
+
+/// A void vertex stands as high as its code says, and what its triangles would show is left out, also in pixels of which
+/// they touch a sample.
+TEST_F(RendererTest, NothingOfVoidsIsSeenInTheSky) {
+  const auto holes = [](TileIndex tile, std::vector<std::uint16_t>& codes) {
+    std::mt19937 random(static_cast<unsigned>(tile.column + 10 * tile.row));
+    for (std::uint16_t& code : codes) code = random() % 30 == 0 ? 65535 : 200;
+  };
+  const auto level = [](TileIndex, std::vector<std::uint16_t>& codes) { std::fill(codes.begin(), codes.end(), 200); };
+  const auto drawn = [](const test::MemoryTiles& source, bool has_ground) {
+    const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
+    TileBox box(source, shared, {});
+    Renderer renderer(source, shared);
+    renderer.set_palette({{0.0, 90, 160, 80}}, 0.0, 1.0);
+    ViewState view;
+    view.width = 320;
+    view.height = 200;
+    Camera camera;
+    camera.look_at({1280.0, 20.0, 2400.0}, {1280.0, 60.0, 600.0});
+    view.eye = camera.eye;
+    view.forward = camera.forward();
+    view.far_distance = 6000.0;
+    view.fixed_level = 0.0;
+    box.finish({view.eye.x, view.eye.z}, view.far_distance);
+    const Offscreen target(view.width, view.height, GL_RGBA8, kPictureSamples);
+    renderer.draw(view, box.range(), [&](PlaneTile at) { return has_ground ? box.resident(at.tile) : nullptr; });
+    return target.read_rgba8();
+  };
+  const test::MemoryTiles smooth(small_grid(), level);
+  const std::vector<std::uint8_t> sky = drawn(smooth, false);
+  const std::vector<std::uint8_t> ground = drawn(smooth, true);
+  const std::vector<std::uint8_t> found = drawn(test::MemoryTiles(small_grid(), holes), true);
+  const auto first = std::mismatch(sky.begin(), sky.end(), ground.begin()).first - sky.begin();
+  const auto whole_rows = first / (4 * 320) * (4 * 320);
+  EXPECT_GT(whole_rows, 4 * 320 * 30) << "rows of sky above all ground";
+  EXPECT_LT(first, static_cast<std::ptrdiff_t>(sky.size())) << "there is ground";
+  EXPECT_TRUE(std::equal(sky.begin(), sky.begin() + whole_rows, found.begin()));
 }
 
 TEST_F(RendererTest, OverviewsFromAnywhereHaveAllCornersInView) {

@@ -291,7 +291,7 @@ int run(const ExportOptions& options) {
   RasterSpec spec;
   spec.width = grid.cut.columns;
   spec.height = grid.cut.rows;
-  spec.sample_type = options.type.value_or(default_type(options.raster.output));
+  spec.sample_type = options.raster.type.value_or(default_type(options.raster.output));
   spec.overwrite = options.raster.overwrite;
   check_raster_room(options.raster.output, spec, grid.cut.across * grid.cut.down);
   const std::vector<std::string> names = ExportTiles(options.raster.output, grid.cut, grid.samples.width).names();

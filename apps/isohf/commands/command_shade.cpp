@@ -233,7 +233,7 @@ std::vector<Frame> frames_of(const ShadeCommand& options, ArchiveReader& archive
   }
   const SunPlace sun = add(options.time, options.output);
   if (!frames.empty()) return frames;
-  throw Error(ErrorCode::kInvalidArgument, fmt::format("--time: the sun stands {:.1f} degrees below the horizon then",
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("--time: the sun stands {:.2g} degrees below the horizon then",
                                                        std::max(0.0, -sun.elevation_deg)));
 }
 
@@ -243,6 +243,14 @@ int run(ShadeCommand options) {
   if (!options.date) check_raster_output({options.archive}, options.output, options.overwrite);
   ArchiveReader archive = open_archive(options.archive);
   print_warnings(archive.warnings());
+  const Metadata& metadata = archive.metadata();
+  if (const auto& ground = metadata.source.ground;
+      ground && !metadata.projection && ground->worst_error > MapGround::kTrueEnough) {
+    print_warning(
+        fmt::format("{}: lengths on its map are {:.4g} times those on the ground, and slopes and shadows are "
+                    "of the map; `convert --projection auto` makes an archive that is true",
+                    options.archive, ground->mean_scale));
+  }
   ShadeOptions& request = options.picture;
   const GridSize size = request.size.value_or(shade_size(archive, options.longest));
   request.size = size;

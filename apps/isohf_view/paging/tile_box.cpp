@@ -72,16 +72,17 @@ TileBox::TileBox(const TileSource& source, const SharedGeometry& shared, const T
   if (!fits(2, 2)) {
     throw Error(
         ErrorCode::kInvalidArgument,
-        fmt::format("memory for tiles: {} bytes do not hold four tiles of {} bytes, those on their way and their "
-                    "shadows",
-                    limits.memory_bytes, slot_bytes_));
+        fmt::format(
+            "memory for tiles: --memory leaves them {} bytes; four of them with their shadows, and those on their "
+            "way, take {}",
+            limits.memory_bytes, bytes_of(2, 2) + on_the_way));
   }
 }
 
-bool TileBox::fits(std::int64_t columns, std::int64_t rows) const {
+std::uint64_t TileBox::bytes_of(std::int64_t columns, std::int64_t rows) const {
   const auto slots = static_cast<std::uint64_t>(columns * rows);
   const auto swept = static_cast<std::uint64_t>(swept_columns(columns));
-  return slots * (slot_bytes_ + depth_bytes_) + swept * vertices_of(source_) * kSweptBytes <= bytes_for_slots_;
+  return slots * (slot_bytes_ + depth_bytes_) + swept * vertices_of(source_) * kSweptBytes;
 }
 
 void TileBox::set_sun(const std::optional<CastingSun>& sun) {

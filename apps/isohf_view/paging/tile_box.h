@@ -118,7 +118,11 @@ class TileBox {
   void request_shadows();
   /// Tile columns that a sweep holds at most, for a box of so many.
   [[nodiscard]] static std::int64_t swept_columns(std::int64_t columns) { return 2 * columns + 8; }
-  [[nodiscard]] bool fits(std::int64_t columns, std::int64_t rows) const;
+  /// What so many tiles take, with their shadows.
+  [[nodiscard]] std::uint64_t bytes_of(std::int64_t columns, std::int64_t rows) const;
+  [[nodiscard]] bool fits(std::int64_t columns, std::int64_t rows) const {
+    return bytes_of(columns, rows) <= bytes_for_slots_;
+  }
   [[nodiscard]] double distance_squared(const Cell& cell, WorldPoint centre) const;
   void count();
 
