@@ -52,7 +52,8 @@ struct EachResult {
 using ConvertOneFile = std::function<std::optional<EachResult>(const EachFile& file, const EachShare& share)>;
 
 /// Runs the conversions: small files side by side, one thread each, and large ones alone on all threads; together they
-/// stay within work.memory_bytes. Where the disk is full, none is begun any more. Tells of every file in the order of the inputs, and of all at the end.
+/// stay within work.memory_bytes. Where the disk is full, none is begun any more. Tells of every file in the order of the
+/// inputs, and of all at the end.
 /// Returns the exit code. Throws Error{kCancelled}.
 int convert_each(const std::vector<EachFile>& files, const EachOptions& options, const WorkOptions& work,
                  const CommonOptions& common, const ConvertOneFile& convert_one, const std::atomic<bool>& cancel);

@@ -48,6 +48,11 @@ centroid out float v_void;       // not beyond the triangle, where a pixel of se
 
 int code(int v) { return int(texelFetch(codes, v).r); }
 
+// Those of a row that the normal takes, below or above vertex v; 0 else.
+ivec4 around(int v, bool odd, bool west, bool east) {
+  return ivec4(odd && !west ? 0 : code(v - 1), code(v), odd ? code(v + 1) : 0, odd && east ? code(v + 2) : 0);
+}
+
 vec3 vertex_normal(int v, int own) {
   int columns = last_xz.x / 2 + 4;
   bool odd = (object_xz.y & 1) == 0;  // the grid row is z + 1
@@ -57,8 +62,8 @@ vec3 vertex_normal(int v, int own) {
   int south = v + columns;
   int before = code(v - 1);
   int behind = code(v + 1);
-  ivec4 n = ivec4(odd && !west ? 0 : code(north - 1), code(north), odd ? code(north + 1) : 0, odd && east ? code(north + 2) : 0);
-  ivec4 s = ivec4(odd && !west ? 0 : code(south - 1), code(south), odd ? code(south + 1) : 0, odd && east ? code(south + 2) : 0);
+  ivec4 n = around(north, odd, west, east);
+  ivec4 s = around(south, odd, west, east);
   ivec4 fall = n - s;
   int across = 2 * (before - behind);
   int rise_x;
