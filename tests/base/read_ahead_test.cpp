@@ -29,6 +29,9 @@ TEST(ReadAhead, MakesNoRoomForWhatTheSourceCannotHold) {
     }
   }
   EXPECT_EQ(ahead.bytes(*source, 400, 600).front(), std::byte{7});
+  // Nor is anything there already of which only sums, taken modulo 2^64, lie within what was read.
+  const std::uint64_t far = std::numeric_limits<std::uint64_t>::max() - 9;
+  EXPECT_THROW((void)ahead.bytes(*source, far, 500), Error);
 }
 
 }  // namespace
