@@ -41,7 +41,7 @@ class EnviSource final : public DescribedSource {
     if (info_.z_scale == 1.0 && info_.z_offset == 0.0) read_scale(words, static_cast<std::size_t>(band));
     if (const auto value = words.find("data ignore value"); value != words.end() && info_.void_values.empty())
       set_void(number(value->second, "data ignore value"));
-    finish(options, number_of_band);
+    finish(options, 0);
   }
 
  private:

@@ -219,7 +219,7 @@ class RoiPacSource final : public DescribedSource {
     } else {
       leave_out_system("projection", projection);
     }
-    finish(options);
+    finish(options, 0);
   }
 
  private:

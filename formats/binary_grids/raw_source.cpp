@@ -1,4 +1,3 @@
-#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <fmt/core.h>
@@ -12,6 +11,7 @@
 
 #include "formats/binary_grids/grid_header.h"
 #include "formats/binary_grids/plain_samples.h"
+#include "formats/files/bands.h"
 #include "formats/files/file_source.h"
 #include "formats/files/raw_file.h"
 #include "formats/files/text.h"

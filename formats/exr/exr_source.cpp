@@ -1,4 +1,3 @@
-#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <OpenEXR/Iex.h>
@@ -30,6 +29,7 @@
 #include <vector>
 
 #include "formats/exr/exr_header.h"
+#include "formats/files/bands.h"
 #include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"

@@ -1,4 +1,3 @@
-#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <fmt/core.h>
@@ -16,6 +15,7 @@
 #include <vector>
 
 #include "formats/binary_grids/grid_header.h"
+#include "formats/files/bands.h"
 #include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/files/text_tokens.h"

@@ -1,4 +1,3 @@
-#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <fmt/format.h>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "formats/binary_grids/plain_samples.h"
+#include "formats/files/bands.h"
 #include "formats/files/text.h"
 #include "formats/files/text_tokens.h"
 #include "formats/georeference/files_beside.h"

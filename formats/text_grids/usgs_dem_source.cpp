@@ -1,4 +1,3 @@
-#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <fmt/format.h>
@@ -18,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "formats/files/bands.h"
 #include "formats/files/file_source.h"
 #include "formats/files/text.h"
 #include "formats/files/text_tokens.h"

@@ -1,4 +1,3 @@
-#include "formats/files/bands.h"
 #include "formats/readers.h"
 
 #include <fmt/core.h>
@@ -20,6 +19,7 @@
 
 #include "formats/binary_grids/plain_samples.h"
 #include "formats/decorate/masked_source.h"
+#include "formats/files/bands.h"
 #include "formats/files/raw_file.h"
 #include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"

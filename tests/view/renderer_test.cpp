@@ -22,12 +22,25 @@ TileGrid small_grid() {
   return TileGrid::make(TileShape::make(68, 83, 4), 4, 3, 640.0, 640.0);
 }
 
+/// Green ground, and what draws it.
+struct Scene {
+  explicit Scene(const test::MemoryTiles& source)
+      : shared(source.grid().shape(), make_index_arrays(source.grid().shape())),
+        box(source, shared, {}),
+        renderer(source, shared) {
+    renderer.set_palette({{0.0, 90, 160, 80}}, 0.0, 1.0);
+  }
+
+  const SharedGeometry shared;
+  TileBox box;
+  Renderer renderer;
+};
+
 TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
   const test::MemoryTiles source(small_grid());
-  const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
-  TileBox box(source, shared, {});
-  Renderer renderer(source, shared);
-  renderer.set_palette({{0.0, 90, 160, 80}}, 0.0, 1.0);
+  Scene scene(source);
+  TileBox& box = scene.box;
+  Renderer& renderer = scene.renderer;
   ViewState view;
   view.width = 640;
   view.height = 360;
@@ -64,10 +77,8 @@ TEST_F(RendererTest, NothingOfVoidsIsSeenInTheSky) {
   };
   const auto level = [](TileIndex, std::vector<std::uint16_t>& codes) { std::fill(codes.begin(), codes.end(), 200); };
   const auto drawn = [](const test::MemoryTiles& source, bool has_ground) {
-    const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
-    TileBox box(source, shared, {});
-    Renderer renderer(source, shared);
-    renderer.set_palette({{0.0, 90, 160, 80}}, 0.0, 1.0);
+    Scene scene(source);
+    TileBox& box = scene.box;
     ViewState view;
     view.width = 320;
     view.height = 200;
@@ -79,7 +90,7 @@ TEST_F(RendererTest, NothingOfVoidsIsSeenInTheSky) {
     view.fixed_level = 0.0;
     box.finish({view.eye.x, view.eye.z}, view.far_distance);
     const Offscreen target(view.width, view.height, GL_RGBA8, kPictureSamples);
-    renderer.draw(view, box.range(), [&](PlaneTile at) { return has_ground ? box.resident(at.tile) : nullptr; });
+    scene.renderer.draw(view, box.range(), [&](PlaneTile at) { return has_ground ? box.resident(at.tile) : nullptr; });
     return target.read_rgba8();
   };
   const test::MemoryTiles smooth(small_grid(), level);

@@ -152,6 +152,10 @@ struct Restored {
   std::optional<SampleMapping> spread;  ///< of decimals over an integer type
 };
 
+SampleType written_type(const RestoreOptions& options, SampleType of_source) {
+  return options.raster.type.value_or(restored_type(options.raster.output, of_source));
+}
+
 class Restorer {
  public:
   Restorer(const RestoreOptions& options, const ArchiveReader& archive, const SampleGrid& grid)
@@ -182,7 +186,7 @@ class Restorer {
     // Text holds any number, and has no place for a scale.
     const bool as_elevations =
         raster_kind(options_.raster.output) == RasterKind::kAsc && (kept.z_scale != 1.0 || kept.z_offset != 0.0);
-    written.type = options_.raster.type.value_or(restored_type(options_.raster.output, kept.type));
+    written.type = written_type(options_, kept.type);
     if (as_elevations) written = {SampleType::kFloat64, 1.0, 0.0};
     auto void_value = record.void_values.empty() ? std::nullopt : std::optional(record.void_values.front());
     // OpenEXR has no void value; what came from there has none but the user's.
@@ -250,9 +254,8 @@ class Restorer {
   Restored run_surface() {
     const Metadata& metadata = archive_.metadata();
     bool has_voids = needs_void(metadata, grid_, options_.raster.output);
-    const SampleType type = options_.raster.type.value_or(
-        restored_type(options_.raster.output, sample_type_from_string(metadata.source.sample_type)));
-    SampleMapping mapping{type, metadata.source.z_scale, metadata.source.z_offset};
+    SampleMapping mapping{written_type(options_, sample_type_from_string(metadata.source.sample_type)),
+                          metadata.source.z_scale, metadata.source.z_offset};
     const RestoreMethod method = options_.raster.method.value_or(usual_method(metadata, grid_));
     Restored restored;
     if (takes_decimals(metadata, mapping)) {
@@ -327,8 +330,7 @@ int run(const RestoreOptions& options) {
   RasterSpec file;
   file.width = grid.width;
   file.height = grid.height;
-  file.sample_type =
-      restored_type(options.raster.output, sample_type_from_string(archive.metadata().source.sample_type));
+  file.sample_type = written_type(options, sample_type_from_string(archive.metadata().source.sample_type));
   check_raster_room(options.raster.output, file);
   Restored restored;
   try {

@@ -31,11 +31,7 @@ struct Conversion {
   std::int64_t end_tile = plan.grid.tile_count();
 
   /// How far a code may lie from what was computed, where that is more than half of a step that was asked for; else 0.
-  [[nodiscard]] double most_off() const {
-    return options.step && options.max_rounding && options.code_type != CodeType::kF32
-               ? *options.max_rounding - height_error
-               : 0.0;
-  }
+  [[nodiscard]] double most_off() const { return chooses_codes(options) ? *options.max_rounding - height_error : 0.0; }
   [[nodiscard]] SourceGeometry geometry() const { return plan.frame.geometry(plan.outside); }
   /// Elevations beyond the source's edge are held within a range.
   [[nodiscard]] std::unique_ptr<TileResampler> cutter(const ElevationRange& held_within) const {

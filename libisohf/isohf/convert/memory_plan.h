@@ -15,6 +15,11 @@ constexpr double kBytesPerVertex = 24.0;
 /// Of each tile of an archive that is written: index, journal and directory.
 constexpr double kBytesPerTile = 200.0;
 
+/// Whether a step and a bound on the rounding leave codes to choose from (docs/decisions/0067).
+[[nodiscard]] inline bool chooses_codes(const ConvertOptions& options) {
+  return options.step && options.max_rounding && options.code_type != CodeType::kF32;
+}
+
 /// How a conversion uses memory. None of it changes a byte of the archive.
 struct MemoryPlan {
   std::uint64_t bytes = 0;        ///< resident set at its peak, the program itself included; within a tenth

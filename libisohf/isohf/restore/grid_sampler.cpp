@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/metadata/part_record.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/handed_in.h"
 #include "isohf/error.h"
@@ -89,7 +90,7 @@ GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation&
       end_z_(world.value_or(grid).world_height()),
       tolerance_(world ? kRoundedPlace : kRounding),
       snaps_(snaps),
-      here_(here.value_or(TileRange{{0, 0}, {grid.tile_columns(), grid.tile_rows()}})),
+      here_(here.value_or(all_tiles(grid))),
       beyond_(snaps ? Beyond::kSloped : Beyond::kMirrored),
       spline_(grid, method == RestoreMethod::kHex ? columns_of(samples, turn, tolerance_) : std::vector<double>{},
               wraps_x, beyond_, scratch),

@@ -13,6 +13,7 @@
 
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/codec/simd/batch_decoder.h"
+#include "isohf/archive/metadata/part_record.h"
 #include "isohf/base/assert.h"
 #include "isohf/surface/shade/normals.h"
 
@@ -138,7 +139,7 @@ PointSampler::PointSampler(const TileGrid& grid, const Quantisation& quantisatio
       quantisation_(quantisation),
       read_tiles_(std::move(read_tiles)),
       snaps_(snaps),
-      here_(here.value_or(TileRange{{0, 0}, {grid.tile_columns(), grid.tile_rows()}})) {
+      here_(here.value_or(all_tiles(grid))) {
   const std::uint64_t bytes = quantisation.type == CodeType::kF32 ? 4 : 2;
   const std::uint64_t tile_bytes = static_cast<std::uint64_t>(grid.shape().stored_vertex_count()) * bytes;
   const auto threads = static_cast<std::uint64_t>(oneapi::tbb::this_task_arena::max_concurrency());

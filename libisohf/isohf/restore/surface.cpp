@@ -111,27 +111,15 @@ class SourceOutline {
   template <typename PlaceOf>
   void hold(std::span<double> elevations, const PlaceOf& place_of) const {
     constexpr std::size_t kRun = 64;
-    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, elevations.size(), kRun),
-                              [&](const auto& some) {
-                                for (std::size_t first = some.begin(); first < some.end(); first += kRun) {
-                                  const std::size_t end = std::min(first + kRun, some.end());
-                                  // Between places that lie farther inside than from each other all lies inside.
-                                  const SourcePosition west = warp_.source_from_world(place_of(first));
-                                  const SourcePosition middle = warp_.source_from_world(place_of((first + end) / 2));
-                                  const SourcePosition east = warp_.source_from_world(place_of(end - 1));
-                                  const auto apart = [](SourcePosition a, SourcePosition b) {
-                                    return std::abs(a.u - b.u) + std::abs(a.v - b.v);
-                                  };
-                                  const double far = apart(west, middle) + apart(middle, east);
-                                  if (inside(west) > far && inside(middle) > far && inside(east) > far) continue;
-                                  for (std::size_t i = first; i < end; ++i) {
-                                    if (std::isnan(elevations[i])) continue;
-                                    if (!(inside(warp_.source_from_world(place_of(i))) >= -kRounded)) {
-                                      elevations[i] = std::numeric_limits<double>::quiet_NaN();
-                                    }
-                                  }
-                                }
-                              });
+    const std::size_t runs = (elevations.size() + kRun - 1) / kRun;
+    oneapi::tbb::parallel_for(std::size_t{0}, runs, [&](std::size_t run) {
+      const std::size_t end = std::min((run + 1) * kRun, elevations.size());
+      if (is_all_inside(run * kRun, end, place_of)) return;
+      for (std::size_t i = run * kRun; i < end; ++i) {
+        if (std::isnan(elevations[i]) || inside(warp_.source_from_world(place_of(i))) >= -kRounded) continue;
+        elevations[i] = std::numeric_limits<double>::quiet_NaN();
+      }
+    });
   }
 
  private:
@@ -142,6 +130,17 @@ class SourceOutline {
         beyond_(geometry.registration == Registration::kArea ? 0.5 : 0.0),
         width_(geometry.wraps_x ? HUGE_VAL : static_cast<double>(geometry.width) - 1.0),
         height_(static_cast<double>(geometry.height) - 1.0) {}
+
+  /// Between places that lie farther inside than from each other all lies inside.
+  template <typename PlaceOf>
+  [[nodiscard]] bool is_all_inside(std::size_t first, std::size_t end, const PlaceOf& place_of) const {
+    const SourcePosition west = warp_.source_from_world(place_of(first));
+    const SourcePosition middle = warp_.source_from_world(place_of((first + end) / 2));
+    const SourcePosition east = warp_.source_from_world(place_of(end - 1));
+    const auto apart = [](SourcePosition a, SourcePosition b) { return std::abs(a.u - b.u) + std::abs(a.v - b.v); };
+    const double far = apart(west, middle) + apart(middle, east);
+    return inside(west) > far && inside(middle) > far && inside(east) > far;
+  }
 
   /// Samples from the nearest edge, below 0 outside; NaN where the map shows no ground.
   [[nodiscard]] double inside(SourcePosition at) const {
