@@ -23,8 +23,8 @@ TileGrid small_grid() {
 }
 
 /// Green ground, and what draws it.
-struct Scene {
-  explicit Scene(const test::MemoryTiles& source)
+struct DrawnGround {
+  explicit DrawnGround(const test::MemoryTiles& source)
       : shared(source.grid().shape(), make_index_arrays(source.grid().shape())),
         box(source, shared, {}),
         renderer(source, shared) {
@@ -38,7 +38,7 @@ struct Scene {
 
 TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
   const test::MemoryTiles source(small_grid());
-  Scene scene(source);
+  DrawnGround scene(source);
   TileBox& box = scene.box;
   Renderer& renderer = scene.renderer;
   ViewState view;
@@ -77,7 +77,7 @@ TEST_F(RendererTest, NothingOfVoidsIsSeenInTheSky) {
   };
   const auto level = [](TileIndex, std::vector<std::uint16_t>& codes) { std::fill(codes.begin(), codes.end(), 200); };
   const auto drawn = [](const test::MemoryTiles& source, bool has_ground) {
-    Scene scene(source);
+    DrawnGround scene(source);
     TileBox& box = scene.box;
     ViewState view;
     view.width = 320;
