@@ -25,6 +25,27 @@ std::filesystem::path temporary_folder() {
   return folder;
 }
 
+std::string next_path() {
+  static int number = 0;
+  return (temporary_folder() / fmt::format("isohf-view-{}-{}.isohf", ::getpid(), ++number)).string();
+}
+
+/// An archive made of a raster, which goes when this does, and with it what a conversion may leave of it.
+class ScratchArchive {
+ public:
+  ScratchArchive() : path_(next_path()) {}
+  ~ScratchArchive() {
+    std::error_code ignored;
+    for (const char* ending : {"", ".part", ".part.journal"}) std::filesystem::remove(path_ + ending, ignored);
+  }
+  ScratchArchive(const ScratchArchive&) = delete;
+  ScratchArchive& operator=(const ScratchArchive&) = delete;
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
 /// Messages name settings between backticks: options of `isohf convert`, of which this program takes none.
 constexpr const char* kWhoseOptions = "options named here are isohf convert's: convert with them, and view the archive";
 bool names_options(const std::string& message) {
@@ -76,19 +97,7 @@ std::unique_ptr<TileSource> open_unconverted(const std::string& name, const std:
   }
 }
 
-std::string next_path() {
-  static int number = 0;
-  return (temporary_folder() / fmt::format("isohf-view-{}-{}.isohf", ::getpid(), ++number)).string();
-}
-
 }  // namespace
-
-ScratchArchive::ScratchArchive() : path_(next_path()) {}
-
-ScratchArchive::~ScratchArchive() {
-  std::error_code ignored;
-  for (const char* ending : {"", ".part", ".part.journal"}) std::filesystem::remove(path_ + ending, ignored);
-}
 
 FileStamp stamp_of(const std::string& path) {
   struct stat found {};
@@ -97,13 +106,14 @@ FileStamp stamp_of(const std::string& path) {
 }
 
 Opened open_shown(const std::string& name, const Options& options, const std::string& second) {
-  Opened opened{name, stamp_of(name), convert_for_viewing(name, options), nullptr};
-  const std::string& path = opened.scratch ? opened.scratch->path() : name;
+  Opened opened{name, stamp_of(name), nullptr};
+  // An open file outlives its name: what is converted leaves nothing behind, however the program ends.
+  const auto shown = convert_for_viewing(name, options);
   if (second.empty()) {
-    opened.source = opened.scratch ? open_archive(path) : open_unconverted(path, {});
+    opened.source = shown ? open_archive(shown->path()) : open_unconverted(name, {});
   } else {
     const auto other = convert_for_viewing(second, options);
-    opened.source = open_archive(path, other ? other->path() : second);  // an open file outlives its name
+    opened.source = open_archive(shown ? shown->path() : name, other ? other->path() : second);
   }
   return opened;
 }

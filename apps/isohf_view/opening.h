@@ -11,19 +11,6 @@
 
 namespace isohf::view {
 
-/// An archive made of a raster, which goes when this does, and with it what a conversion may leave of it.
-class ScratchArchive {
- public:
-  ScratchArchive();
-  ~ScratchArchive();
-  ScratchArchive(const ScratchArchive&) = delete;
-  ScratchArchive& operator=(const ScratchArchive&) = delete;
-  [[nodiscard]] const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
 /// Tells one state of a file from another; all 0 where there is none.
 struct FileStamp {
   std::uint64_t inode = 0;
@@ -38,7 +25,6 @@ struct FileStamp {
 struct Opened {
   std::string name;
   FileStamp stamp;  ///< when it was opened
-  std::unique_ptr<ScratchArchive> scratch;
   std::unique_ptr<TileSource> source;
 };
 

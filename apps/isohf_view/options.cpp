@@ -231,6 +231,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   line.flag("--no-haze", "Leave out the haze towards the far distance", no_haze);
   line.flag("--no-base", "Leave out the block that the ground stands on, and the hatching below voids", no_base);
   line.flag("--no-overlay", "Leave out what a window writes over the picture", no_overlay);
+  line.flag("--legend", "Write scale bar, North arrow and the colours' legend on pictures", options.legend);
   add_light(line, options, time);
   line.group("Work");
   line.option(
@@ -254,6 +255,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   needs("--baseline", flies, "--flight");
   needs("--csv", flies || sweep, "--flight or --sweep");
   needs("--steps", sweep, "--sweep");
+  needs("--legend", !options.screenshot.empty() && !window, "--screenshot without --window");
   needs("--tiles", verify, "--verify");
   needs("--every", verify, "--verify");
   needs("--time", options.date.has_value(), "--date");

@@ -29,6 +29,7 @@ struct Options {
   bool baseline = false;
   bool overwrite = false;
   bool overlay = true;           ///< figures on the screen
+  bool legend = false;           ///< on pictures
   std::optional<Vec3> position;  ///< world units, y before exaggeration
   std::optional<Vec3> look_at;
   bool fly = false;

@@ -11,6 +11,8 @@
 #include "gl/offscreen.h"
 #include "isohf/error.h"
 #include "options/describe.h"
+#include "reading/place.h"
+#include "steering.h"
 
 namespace isohf::view {
 namespace {
@@ -303,14 +305,16 @@ void Session::draw_overlay(const Shown& shown) {
                                     static_cast<double>(textures.resident_bytes) / (1 << 20)));
       }
     }
-    lines.push_back(fmt::format("sun {:.0f}, {:.0f} deg   heights x {:.3g}   H: help", sun_azimuth_deg,
-                                sun_elevation_deg, view.exaggeration));
-    if (time_) {
-      lines.push_back(fmt::format("{:04}-{:02}-{:02}, mean solar time", time_->year, time_->month, time_->day));
+    if (shown.figures != Figures::kLegend) {
+      lines.push_back(fmt::format("sun {:.0f}, {:.0f} deg   heights x {:.3g}   H: help", sun_azimuth_deg,
+                                  sun_elevation_deg, view.exaggeration));
+      if (time_) {
+        lines.push_back(fmt::format("{:04}-{:02}-{:02}, mean solar time", time_->year, time_->month, time_->day));
+      }
+      if (shows_textures() && textures_->error()) lines.push_back(*textures_->error());
+      if (cut_) lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
+      if (boxes_.error()) lines.push_back(*boxes_.error());
     }
-    if (shows_textures() && textures_->error()) lines.push_back(*textures_->error());
-    if (cut_) lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
-    if (boxes_.error()) lines.push_back(*boxes_.error());
     lines.insert(lines.end(), shown.place.begin(), shown.place.end());
     if (view.mode == ColourMode::kElevation || view.mode == ColourMode::kDifference) reading.colours = legend_.stops;
     reading.low = legend_.low;
@@ -324,6 +328,24 @@ void Session::draw_overlay(const Shown& shown) {
   reading.profile = shown.profile;
   for (const Vec3 at : shown.way) reading.way.push_back(project(camera, view, at));
   hud_.draw(reading, view.width, view.height, shown.screen_scale);
+}
+
+void Session::draw_legend() {
+  Ground ground(source_);
+  Shown shown;
+  shown.figures = Figures::kLegend;
+  const auto middle = Steering(source_, ground, camera, view).pick({0.5 * view.width, 0.5 * view.height});
+  if (middle) shown.middle_distance = true_distance(*middle);
+  draw_overlay(shown);
+}
+
+double Session::true_distance(Vec3 at) const {
+  const double distance = length(at - camera.eye);
+  if (distance == 0.0) return 0.0;
+  // By a hundredth of the way across the picture, which is short enough for the body to be flat.
+  const double step = 0.01 * distance;
+  const WorldPoint beside{at.x + step * std::cos(camera.heading_rad), at.z + step * std::sin(camera.heading_rad)};
+  return distance * distance_between(source_, {at.x, at.z}, beside) / step;
 }
 
 }  // namespace isohf::view

@@ -33,7 +33,8 @@ class Session {
   /// Changes the far distance by a factor.
   void scale_far(double factor) { far_distance_ = view.far_distance * factor; }
   /// What a person reads over the frame.
-  enum class Figures { kNone, kPlace, kAll };  ///< kPlace: what a person asks the ground; kAll: how it is drawn as well
+  /// kLegend: scale bar, North arrow and colours; kPlace: what a person asks the ground too; kAll: how it is drawn as well
+  enum class Figures { kNone, kLegend, kPlace, kAll };
   struct Shown {
     double frames_per_second = 0.0;
     Figures figures = Figures::kPlace;
@@ -45,6 +46,10 @@ class Session {
     double screen_scale = 1.0;
   };
   void draw_overlay(const Shown& shown);
+  /// The same for a picture without a hand: the legend alone.
+  void draw_legend();
+  /// The distance from the eye as long as it is on the body.
+  [[nodiscard]] double true_distance(Vec3 at) const;
 
   /// A place of the archive's world, y without exaggeration, as drawn; and the eye's, back.
   [[nodiscard]] Vec3 from_archive(Vec3 at) const;

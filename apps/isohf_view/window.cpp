@@ -157,7 +157,7 @@ class Controls {
     shown.screen_scale = screen_scale();
     const ViewState& view = session_.view;
     const auto middle = steering_.pick({0.5 * view.width, 0.5 * view.height});
-    if (middle) shown.middle_distance = length(*middle - session_.camera.eye) * true_lengths_at(*middle);
+    if (middle) shown.middle_distance = session_.true_distance(*middle);
     const auto there = inside_ ? steering_.pick(cursor_) : std::nullopt;
     if (!message.empty()) shown.place.push_back(message);
     if (there) {
@@ -178,15 +178,6 @@ class Controls {
     if (measured_from_) shown.way = measured_way(end);
     shown.profile = profile_;
     return shown;
-  }
-
-  /// Length on the body of what is one long on the map there, across the view: what the scale bar shows.
-  [[nodiscard]] double true_lengths_at(Vec3 at) const {
-    const double step = 0.01 * length(at - session_.camera.eye);
-    const double heading = session_.camera.heading_rad;
-    const WorldPoint from{at.x, at.z};
-    const WorldPoint to{at.x + step * std::cos(heading), at.z + step * std::sin(heading)};
-    return step > 0.0 ? distance_between(session_.source(), from, to) / step : 1.0;
   }
 
   /// As drawn: over the ground once both ends stand.

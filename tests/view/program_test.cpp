@@ -308,6 +308,32 @@ TEST_F(ViewProgramTest, ShowsARasterAndLeavesNothingBehind) {
   EXPECT_TRUE(std::filesystem::is_empty(folder));
 }
 
+TEST_F(ViewProgramTest, AKilledOneLeavesNothingOfARaster) {
+  const std::string folder = path("scratch");
+  std::filesystem::create_directory(folder);
+  test::write_file(path("way.txt"), "0 100 200 600  480 0 100\n2 500 150 500  480 0 0\n");
+  // The table is begun once the raster is open.
+  const test::RunResult killed = test::run_program(
+      {"/bin/sh", "-c",
+       "TMPDIR=\"$1\" '" ISOHF_BIN_DIR "/isohf-view' '" ISOHF_SOURCE_DIR
+       "/testdata/coast_512x384_int16.tif' -q --size 64x48 --frames 1000000 --flight \"$2/way.txt\" --csv "
+       "\"$2/fly.csv\" & viewer=$!\n"
+       "until ls \"$2\" | grep -q fly.csv; do kill -0 $viewer || exit 9; sleep 0.05; done; kill -KILL $viewer",
+       "sh", folder, path("")});
+  EXPECT_EQ(killed.exit_code, 0) << killed.err;
+  EXPECT_TRUE(std::filesystem::is_empty(folder));
+}
+
+TEST_F(ViewProgramTest, WritesALegendOnPictures) {
+  const std::string shot = path("good.isohf") + " --size 320x240 --overwrite --screenshot " + path("legend.png");
+  EXPECT_EQ(run(shot).exit_code, 0);
+  const std::string bare = text("legend.png");
+  const Outcome written = run(shot + " --legend");
+  EXPECT_EQ(written.exit_code, 0) << written.err;
+  EXPECT_NE(text("legend.png"), bare);
+  EXPECT_EQ(run(path("good.isohf") + " --legend --verify").exit_code, 2);
+}
+
 TEST_F(ViewProgramTest, LeavesNothingInAFolderThatIsTooSmallForARaster) {
   const std::string folder = path("scratch");
   std::filesystem::create_directory(folder);

@@ -48,6 +48,34 @@ TEST_F(VerifyViewTest, PassesOnSoundTiles) {
   EXPECT_GT(report.shared_vertices, 450);
 }
 
+TEST_F(VerifyViewTest, ManyTilesTakeTurns) {
+  const MemoryTiles source(TileGrid::make(TileShape::make(20, 27, 3), 13, 5, 480.0, 496.0));
+  const IndexArrays sound = make_index_arrays(source.grid().shape());
+  ViewChecks some;
+  some.tiles = isohf::TileRange{{0, 0}, {8, 5}};
+  const ViewReport all_pictures = verify_view(source, sound, some);
+  const ViewReport in_turn = verify_view(source, sound);
+  EXPECT_TRUE(all_pictures.passed()) << text_of(all_pictures);
+  EXPECT_TRUE(in_turn.passed()) << text_of(in_turn);
+  EXPECT_EQ(all_pictures.tiles, 40);
+  EXPECT_EQ(in_turn.tiles, 65);
+  EXPECT_LT(in_turn.pictures, all_pictures.pictures / 2);
+  // All vertices and arrays are looked at, and each level's pictures.
+  EXPECT_EQ(in_turn.vertices * 40, all_pictures.vertices * 65);
+  for (std::size_t level = 0; level < 3; ++level) {
+    IndexArrays broken = sound;
+    broken.strips[level][broken.strips[level].size() / 2 + 5] += 1;
+    const ViewReport report = verify_view(source, broken, quick(false));
+    for (const int id : {finding::kDrawnMesh, finding::kDrawnHeight}) {
+      EXPECT_TRUE(std::any_of(
+          report.findings.begin(), report.findings.end(),
+          [&](const ViewFinding& found) { return found.id == id && found.level == static_cast<double>(level); }))
+          << level << "\n"
+          << text_of(report);
+    }
+  }
+}
+
 TEST_F(VerifyViewTest, PassesWhereTilesHaveVoids) {
   // A hole across a corner of four tiles, by world place so that all four agree, and one tile wholly void.
   const TileGrid grid = tiny_grid();

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <cstring>
 #include <span>
+#include <string_view>
 
 #include "formats/write/raster_sink.h"
 #include "isohf/error.h"
@@ -17,12 +19,16 @@ struct HeadlessContext::State {
   EGLDisplay display = EGL_NO_DISPLAY;
   EGLContext context = EGL_NO_CONTEXT;
 
+  State() = default;
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
   ~State() {
     if (display == EGL_NO_DISPLAY) return;
     eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     if (context != EGL_NO_CONTEXT) eglDestroyContext(display, context);
     eglTerminate(display);
   }
+  void open(EGLDisplay where);
 };
 
 namespace {
@@ -31,44 +37,76 @@ bool has_word(const char* list, const char* word) {
   return list != nullptr && std::strstr(list, word) != nullptr;
 }
 
-[[noreturn]] void refuse(const char* what) {
-  throw Error(ErrorCode::kUnsupported,
-              fmt::format("no headless OpenGL 3.3: {} (EGL error 0x{:04x}); a GL driver with EGL is required, Mesa's "
-                          "software driver will do",
-                          what, eglGetError()));
+Error refusal(const char* what) {
+  return {ErrorCode::kUnsupported,
+          fmt::format("no headless OpenGL 3.3: {} (EGL error 0x{:04x}); a GL driver with EGL is required, Mesa's "
+                      "software driver will do",
+                      what, eglGetError())};
 }
 
-EGLDisplay open_display() {
+bool software_is_wanted() {
+  const char* said = std::getenv("LIBGL_ALWAYS_SOFTWARE");
+  return said != nullptr && std::string_view(said) != "0" && std::string_view(said) != "false";
+}
+
+/// Where a context may be had, in order: GPUs, then no surface at all, then what EGL takes by default.
+std::vector<EGLDisplay> possible_displays() {
+  std::vector<EGLDisplay> displays;
   const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
-  if (has_word(client, "EGL_EXT_platform_base") && has_word(client, "EGL_MESA_platform_surfaceless")) {
-    EGLDisplay display = eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
-    if (display != EGL_NO_DISPLAY && eglInitialize(display, nullptr, nullptr) == EGL_TRUE) return display;
+  if (has_word(client, "EGL_EXT_platform_base")) {
+    if (has_word(client, "EGL_EXT_device_enumeration") && has_word(client, "EGL_EXT_platform_device") &&
+        !software_is_wanted()) {
+      std::array<EGLDeviceEXT, 16> devices{};
+      EGLint count = 0;
+      if (eglQueryDevicesEXT(devices.size(), devices.data(), &count) != EGL_TRUE) count = 0;
+      for (EGLDeviceEXT device : std::span(devices).first(static_cast<std::size_t>(count))) {
+        if (has_word(eglQueryDeviceStringEXT(device, EGL_EXTENSIONS), "EGL_MESA_device_software")) continue;
+        displays.push_back(eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, device, nullptr));
+      }
+    }
+    if (has_word(client, "EGL_MESA_platform_surfaceless")) {
+      displays.push_back(eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
+    }
   }
-  EGLDisplay display = eglGetDisplay(EGL_DEFAULT_DISPLAY);
-  if (display == EGL_NO_DISPLAY || eglInitialize(display, nullptr, nullptr) != EGL_TRUE) {
-    refuse("EGL offers no display");
-  }
-  return display;
+  displays.push_back(eglGetDisplay(EGL_DEFAULT_DISPLAY));
+  return displays;
 }
 
 }  // namespace
 
-HeadlessContext::HeadlessContext() : state_(std::make_unique<State>()) {
-  state_->display = open_display();
-  if (eglBindAPI(EGL_OPENGL_API) != EGL_TRUE) refuse("EGL does not offer desktop OpenGL");
+/// Makes the context there and uses it.
+void HeadlessContext::State::open(EGLDisplay where) {
+  if (where == EGL_NO_DISPLAY || eglInitialize(where, nullptr, nullptr) != EGL_TRUE) {
+    throw refusal("EGL offers no display");
+  }
+  display = where;
+  if (eglBindAPI(EGL_OPENGL_API) != EGL_TRUE) throw refusal("EGL does not offer desktop OpenGL");
   const std::array<EGLint, 5> wanted{EGL_SURFACE_TYPE, 0, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
   EGLConfig config = nullptr;
   EGLint count = 0;
-  if (eglChooseConfig(state_->display, wanted.data(), &config, 1, &count) != EGL_TRUE || count < 1) {
-    refuse("EGL has no OpenGL configuration");
+  if (eglChooseConfig(display, wanted.data(), &config, 1, &count) != EGL_TRUE || count < 1) {
+    throw refusal("EGL has no OpenGL configuration");
   }
   const std::array<EGLint, 7> version{
       EGL_CONTEXT_MAJOR_VERSION,           3,       EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK,
       EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
-  state_->context = eglCreateContext(state_->display, config, EGL_NO_CONTEXT, version.data());
-  if (state_->context == EGL_NO_CONTEXT) refuse("the driver makes no OpenGL 3.3 core context");
-  if (eglMakeCurrent(state_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, state_->context) != EGL_TRUE) {
-    refuse("the context cannot be used without a surface");
+  context = eglCreateContext(display, config, EGL_NO_CONTEXT, version.data());
+  if (context == EGL_NO_CONTEXT) throw refusal("the driver makes no OpenGL 3.3 core context");
+  if (eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context) != EGL_TRUE) {
+    throw refusal("the context cannot be used without a surface");
+  }
+}
+
+HeadlessContext::HeadlessContext() {
+  const std::vector<EGLDisplay> displays = possible_displays();
+  for (std::size_t i = 0; i < displays.size(); ++i) {
+    state_ = std::make_unique<State>();
+    try {
+      state_->open(displays[i]);
+      return;
+    } catch (const Error&) {
+      if (i + 1 == displays.size()) throw;
+    }
   }
 }
 
@@ -122,7 +160,7 @@ void Offscreen::show() const {
   check_gl("showing a picture");
 }
 
-void Offscreen::bind_for_reading() const {
+void Offscreen::bind_joined() const {
   bind();
   if (resolved_ == nullptr) return;
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, resolved_->framebuffer_.get());
@@ -131,17 +169,17 @@ void Offscreen::bind_for_reading() const {
 }
 
 void Offscreen::write_picture(const std::string& path) const {
-  bind_for_reading();
+  bind_joined();
   view::write_picture(path, width_, height_);
 }
 
 std::vector<std::uint8_t> Offscreen::read_rgba8() const {
-  bind_for_reading();
+  bind_joined();
   return read_pixels(width_, height_);
 }
 
 void Offscreen::read_rgba32f(std::vector<float>& out) const {
-  bind_for_reading();
+  bind_joined();
   out.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_) * 4);
   glReadPixels(0, 0, width_, height_, GL_RGBA, GL_FLOAT, out.data());
   check_gl("reading pixels");

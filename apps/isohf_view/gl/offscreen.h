@@ -9,8 +9,9 @@
 
 namespace isohf::view {
 
-/// An OpenGL 3.3 core context without a window or a display server: EGL's surfaceless platform, else its default
-/// display. Current on the thread that made it until it goes.
+/// An OpenGL 3.3 core context without a window or a display server: on a GPU where EGL lists one (not with
+/// LIBGL_ALWAYS_SOFTWARE=1), else EGL's surfaceless platform, else its default display. Current on the thread that made it
+/// until it goes.
 class HeadlessContext {
  public:
   /// Throws Error{kUnsupported}, one line, where no such context can be had.
@@ -41,6 +42,8 @@ class Offscreen {
   void bind() const;
   /// Copies the picture to the window, whose framebuffer is then bound.
   void show() const;
+  /// Binds the picture with each pixel's samples joined, to be read or written over.
+  void bind_joined() const;
   /// As view::write_picture.
   void write_picture(const std::string& path) const;
   [[nodiscard]] int width() const { return width_; }
@@ -52,8 +55,6 @@ class Offscreen {
   void read_rgba32f(std::vector<float>& out) const;
 
  private:
-  void bind_for_reading() const;
-
   int width_;
   int height_;
   Framebuffer framebuffer_;

@@ -34,15 +34,13 @@ uniform vec3 anchor;            // the anchor's place, seen from the eye; y: ele
 uniform float code_height;      // world units of one code, exaggeration included
 uniform float code_slope;       // the same for normals
 uniform mat4 clip_from_eye;
+invariant gl_Position;          // programs with RIM and without put a vertex in the same place
 // Two slots of four: a software rasteriser pays for each slot and triangle.
 out vec4 v_facing;              // unit normal, distance from the eye
 out vec4 v_place;               // object space x and z, elevation code, depth in the shadow
 #ifdef RIM
 uniform vec4 covered;           // West, North, East, South of what is shown, seen from the eye
-out gl_PerVertex {
-  vec4 gl_Position;
-  float gl_ClipDistance[4];     // only looked at where the renderer asks for it
-};
+out float gl_ClipDistance[4];   // only looked at where the renderer asks for it
 centroid out float v_void;       // not beyond the triangle, where a pixel of several samples only touches it
 #endif
 

@@ -53,6 +53,7 @@ class SeamVerifier {
   [[nodiscard]] ViewFinding describe(const Block& block, const Slant& slant, int even_level, int odd_level,
                                      double along_px, double across) const;
 
+  const CheckContext& context_;
   const TileSource& source_;
   const SharedGeometry& shared_;
   const ViewChecks& options_;
@@ -66,7 +67,8 @@ class SeamVerifier {
 };
 
 SeamVerifier::SeamVerifier(const CheckContext& context)
-    : source_(context.source),
+    : context_(context),
+      source_(context.source),
       shared_(context.shared),
       options_(context.options),
       here_(context.here),
@@ -101,6 +103,7 @@ bool SeamVerifier::load(Block& block) {
 
 void SeamVerifier::verify() {
   std::int64_t number = 0;
+  std::int64_t seen = 0;
   const auto rows = block_firsts(here_.first.row, here_.end.row);
   const auto columns = block_firsts(here_.first.column, here_.end.column);
   for (const std::int64_t row : rows) {
@@ -110,7 +113,7 @@ void SeamVerifier::verify() {
       const isohf::TileRange whole{{column, row}, {column + kBlockTiles, row + kBlockTiles}};
       const auto& wanted = options_.tiles;
       const bool is_wanted = number % options_.every == 0 && (!wanted || !intersection(*wanted, whole).is_empty());
-      if (is_wanted && load(block)) verify_block(block, number);
+      if (is_wanted && load(block)) verify_block(block, seen++);
       ++number;
       if (options_.progress)
         options_.progress("seams", number, static_cast<std::int64_t>(rows.size() * columns.size()));
@@ -126,6 +129,7 @@ void SeamVerifier::verify_block(const Block& block, std::int64_t number) {
   const double gentle = 2.0 / std::max(rough_step(block), 1.0);
   int picture = 0;
   for (int even = 0; even < levels; ++even) {
+    if (!context_.has_turn(number / levels, even, levels)) continue;
     for (int shift = 0; shift < levels; ++shift) {
       if (!every_pair && shift != number % levels) continue;
       const int odd = (even + shift) % levels;
@@ -134,7 +138,7 @@ void SeamVerifier::verify_block(const Block& block, std::int64_t number) {
         slanted(block, even, odd, {along_x, k});
         slanted(block, even, odd, {along_x, -k});
       }
-      if (every_pair || even == number % levels) from_above(block, even, odd);
+      if (every_pair || context_.takes_turns || even == number % levels) from_above(block, even, odd);
     }
   }
 }

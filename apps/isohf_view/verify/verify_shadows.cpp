@@ -36,7 +36,7 @@ class ShadowVerifier {
   void verify();
 
  private:
-  void verify_row(std::int64_t row, LightTravel travel);
+  void verify_row(std::int64_t row, LightTravel travel, std::int64_t number);
   void verify_tile(TileIndex tile, const RowSun& sun, std::size_t sun_number, std::vector<double>& entering);
   void check_vertices(TileIndex tile, const RowSun& sun);
   void check_share(TileIndex tile, const RowSun& sun, int level, const PixelWindow& window);
@@ -69,25 +69,32 @@ void ShadowVerifier::verify() {
   const TileGrid& grid = source_.grid();
   report_.suns_deg.assign(std::begin(kElevations_deg), std::end(kElevations_deg));
   const auto& wanted = context_.options.tiles;
+  std::int64_t number = 0;
   for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
     if (wanted && (row < wanted->first.row || row >= wanted->end.row)) continue;
     if (row % context_.options.every != 0) continue;
-    for (const LightTravel travel : {LightTravel::kEastward, LightTravel::kWestward}) verify_row(row, travel);
+    verify_row(row, LightTravel::kEastward, number);
+    verify_row(row, LightTravel::kWestward, ++number);
     if (context_.options.progress) context_.options.progress("shadows", row + 1, grid.tile_rows());
   }
 }
 
-void ShadowVerifier::verify_row(std::int64_t row, LightTravel travel) {
+void ShadowVerifier::verify_row(std::int64_t row, LightTravel travel, std::int64_t number) {
   const TileGrid& grid = source_.grid();
+  std::vector<double> suns_deg;
+  for (std::size_t sun = 0; sun < report_.suns_deg.size(); ++sun) {
+    const auto count = static_cast<std::int64_t>(report_.suns_deg.size());
+    if (context_.has_turn(number, static_cast<std::int64_t>(sun), count)) suns_deg.push_back(report_.suns_deg[sun]);
+  }
   const std::vector<double> dark(static_cast<std::size_t>(visible_rows(grid.shape())), kNoShadow);
-  std::vector<std::vector<double>> entering(report_.suns_deg.size(), dark);
+  std::vector<std::vector<double>> entering(suns_deg.size(), dark);
   // As along the row, ground that lies beyond the source casts too.
   const CastingLimits all_ground{.ground = WorldBounds{0.0, 0.0, grid.world_width(), grid.world_height()}};
   std::vector<TileIndex> tiles;
   for (std::int64_t i = 0; i < grid.tile_columns(); ++i) tiles.push_back({i, row});
   std::vector<std::vector<TileShadow>> cast;
   const std::atomic<bool> leaves{false};
-  for (const double elevation_deg : report_.suns_deg) {
+  for (const double elevation_deg : suns_deg) {
     std::string unread;  // the tile's own check says so
     cast.push_back(cast_shadows(
         source_, {travel == LightTravel::kEastward ? 270.0 : 90.0, elevation_deg, kSoftness * source_.scale().scale},
@@ -104,7 +111,7 @@ void ShadowVerifier::verify_row(std::int64_t row, LightTravel travel) {
     slot_.upload(codes_);
     for (std::size_t k = 0; k < entering.size(); ++k) {
       cast_ = std::move(cast[k][static_cast<std::size_t>(tile.column)]);
-      verify_tile(tile, {travel, report_.suns_deg[k]}, k, entering[k]);
+      verify_tile(tile, {travel, suns_deg[k]}, k, entering[k]);
     }
   }
 }

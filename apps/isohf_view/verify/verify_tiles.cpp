@@ -62,7 +62,7 @@ class TileVerifier {
 };
 
 void TileVerifier::verify(TileIndex tile) {
-  ++report_.tiles;
+  const std::int64_t number = report_.tiles++;
   try {
     source_.read(tile, codes_);
   } catch (const Error& error) {
@@ -78,11 +78,18 @@ void TileVerifier::verify(TileIndex tile) {
   probe_.capture(slot_, voids_, captured_);
   check_vertices(tile);
   check_shared(tile);
+  const int levels = shape.levels();
+  std::vector<double> transitions;
+  for (int level = 0; level + 1 < levels; ++level) {
+    for (const double fraction : context_.options.fractions) transitions.push_back(level + fraction);
+  }
+  const auto count = static_cast<std::int64_t>(transitions.size());
   for (const PixelWindow& window : context_.oracle.windows()) {
-    for (int level = 0; level < shape.levels(); ++level) {
-      check_level(tile, level, window);
-      if (level + 1 == shape.levels()) continue;
-      for (const double fraction : context_.options.fractions) check_transition(tile, level + fraction, window);
+    for (int level = 0; level < levels; ++level) {
+      if (context_.has_turn(number, level, levels)) check_level(tile, level, window);
+    }
+    for (std::int64_t i = 0; i < count; ++i) {
+      if (context_.has_turn(number, i, count)) check_transition(tile, transitions[static_cast<std::size_t>(i)], window);
     }
   }
 }

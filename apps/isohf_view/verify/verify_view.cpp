@@ -131,7 +131,15 @@ ViewReport verify_view(const TileSource& source, const IndexArrays& arrays, cons
   TileProbe probe(grid, shared, source.scale().scale);
   const isohf::TileRange all{{0, 0}, {grid.tile_columns(), grid.tile_rows()}};
   const isohf::TileRange here = source.metadata() != nullptr ? tiles_of(*source.metadata()) : all;
-  const CheckContext context{source, shared, oracle, probe, options, here, report};
+  const isohf::TileRange seen = options.tiles ? intersection(here, *options.tiles) : here;
+  const CheckContext context{.source = source,
+                             .shared = shared,
+                             .oracle = oracle,
+                             .probe = probe,
+                             .options = options,
+                             .here = here,
+                             .takes_turns = seen.count() / options.every > kAllPictures,
+                             .report = report};
   verify_tiles(context);
   report.is_part = !(here == all);
   // Tiles that disagree shade each other in two ways, and so do those that are elsewhere.

@@ -65,13 +65,18 @@ struct ViewReport {
 [[nodiscard]] std::string check_name(int id);
 
 /// Draws every tile at every level, whole and fractional, through the buffers, shaders and index arrays that pictures
-/// are drawn with, and compares what comes back with the library's own arithmetic. A GL context must be current.
+/// are drawn with, and compares what comes back with the library's own arithmetic. A GL context must be current. Of more
+/// than kAllPictures tiles all vertices and index arrays are looked at, and pictures in turn: each tile at one level and
+/// in one transition, each row of shadows under one sun from either side, each block of seams at one pair of levels.
 ///
 /// arrays  what SharedGeometry uploads; make_index_arrays(shape) unless a fault is wanted
 /// The oracles never look at the arrays: level λ is the barycentric surface of a coarse tile. A tile that cannot be
 /// read is a finding; Errors of GL are thrown.
 [[nodiscard]] ViewReport verify_view(const TileSource& source, const IndexArrays& arrays,
                                      const ViewChecks& options = {});
+
+/// Tiles that are drawn at every level, in every transition and under every sun.
+inline constexpr std::int64_t kAllPictures = 64;
 
 // Inside of it, from here on.
 
@@ -83,8 +88,13 @@ struct CheckContext {
   TileProbe& probe;
   const ViewChecks& options;
   isohf::TileRange here;  ///< of an archive that is a part: nothing is said of the others
+  bool takes_turns;       ///< more than kAllPictures tiles are looked at
   ViewReport& report;
 
+  /// True where what comes `number`-th looks at `which` of `count` kinds of picture.
+  [[nodiscard]] bool has_turn(std::int64_t number, std::int64_t which, std::int64_t count) const {
+    return !takes_turns || number % count == which;
+  }
   /// True where a tile must be drawn with the shaders that discard voids.
   [[nodiscard]] bool has_voids(TileIndex tile) const {
     const TileBounds bounds = source.bounds(tile);
@@ -112,8 +122,8 @@ void verify_shadows(const CheckContext& context);
 /// every pixel between its two ends must be drawn, whatever the terrain does between them; likewise along z. A step of
 /// the ground at a seam opens a gap in one of the two directions of slant. Last, from an eye above the block whose
 /// whole view meets the ground inside it, every pixel must be drawn.
-/// Archives of up to 16 tiles meet every pair of levels in every block; larger ones every level on both sides of each
-/// seam, the pairs changing from block to block.
+/// Archives of up to 16 tiles meet every pair of levels in every block, those of up to kAllPictures every level on both
+/// sides of each seam, the pairs changing from block to block; larger ones one pair in a block.
 void verify_seams(const CheckContext& context);
 
 // Why tolerances are what they are: codes and unit normals pass through 32-bit interpolation, whose planes are told
