@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -47,9 +49,10 @@ int take_screenshot(const TileSource& source, const Options& options) {
   if (options.legend) session.draw_legend();
   write_picture(options.screenshot, target.width(), target.height());
   print_result(options.common, "", [&] {
-    return ordered_json{
-        {"archive", options.archives[0]}, {"screenshot", options.screenshot},          {"width", target.width()},
-        {"height", target.height()},      {"exaggeration", session.view.exaggeration}, {"cut", session.is_cut()}};
+    return ordered_json{{"archive", options.archives[0]}, {"screenshot", options.screenshot},
+                        {"driver", driver_name()},        {"width", target.width()},
+                        {"height", target.height()},      {"exaggeration", session.view.exaggeration},
+                        {"cut", session.is_cut()}};
   });
   return cli::kExitDone;
 }
@@ -123,9 +126,17 @@ int verify(const TileSource& source, const Options& options) {
     wanted.tiles = tiles;
   }
   cli::ProgressDisplay display(cli::ProgressMode::kAuto, options.common.quiet, options.common.verbose);
-  wanted.progress = [&display, check = interrupt_check()](const char* what, std::int64_t done, std::int64_t all) {
+  // Of several checks at a time the one that is farthest behind.
+  std::map<std::string, std::pair<std::int64_t, std::int64_t>> state;
+  wanted.progress = [&, check = interrupt_check()](const char* what, std::int64_t done, std::int64_t all) {
     check();
-    display.update(what, std::string(what) == "tiles" ? "tiles" : "rows", done, all);
+    state[what] = {done, all};
+    const auto share = [](const auto& entry) {
+      return static_cast<double>(entry.second.first) / static_cast<double>(entry.second.second);
+    };
+    const auto last =
+        std::min_element(state.begin(), state.end(), [&](const auto& a, const auto& b) { return share(a) < share(b); });
+    display.update(last->first, last->first == "tiles" ? "tiles" : "rows", last->second.first, last->second.second);
   };
   const ViewReport report = verify_view(source, make_index_arrays(grid.shape()), wanted);
   display.clear();

@@ -103,6 +103,7 @@ TEST_F(ViewProgramTest, FliesAndCountsEachFrame) {
   EXPECT_EQ(outcome.err, "");
   EXPECT_NE(outcome.out.find("frames with more than 2 draw calls a visible tile and pass: 0"), std::string::npos);
   EXPECT_NE(outcome.out.find("plain static mesh"), std::string::npos);
+  EXPECT_EQ(outcome.out.find("driver: "), 0U) << outcome.out;
   const std::string csv = text("frames.csv");
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 13);
   EXPECT_NE(text("frames.svg").find("</svg>"), std::string::npos);

@@ -128,6 +128,7 @@ std::string text_from(const FlightTotals& totals, const Options& options) {
   const FlightSummary summary = summary_of(totals);
   const auto frames = static_cast<std::int64_t>(summary.frames);
   return fmt::format(
+      "driver: {}\n"
       "frames: {}, ms: mean {:.2f}, median {:.2f}, 99 % {:.2f}, worst {:.2f}\n"
       "triangles: {} a frame, {:.2f} million a second\n"
       "tile memory: at most {:.1f} MiB, bound {} MiB; uploaded {:.1f} MiB\n"
@@ -135,7 +136,7 @@ std::string text_from(const FlightTotals& totals, const Options& options) {
       "process: {:.1f} MiB of its own before the first tile, {:.1f} MiB at most; peak with mapped files {:.1f} MiB\n"
       "frames with more than 2 draw calls a visible tile and pass: {}\n"
       "tiles in view that were not there yet, a frame: {:.2f}\n",
-      frames, summary.mean_ms, summary.median_ms, summary.percentile_99_ms, summary.worst_ms,
+      driver_name(), frames, summary.mean_ms, summary.median_ms, summary.percentile_99_ms, summary.worst_ms,
       cli::describe_count(totals.triangles / frames), summary.triangles_per_second / 1e6, mib(totals.most_bytes),
       options.memory_mib, mib(totals.upload_bytes), summary.update_mean_ms, summary.update_worst_ms,
       mib(totals.anonymous_before), mib(totals.most_anonymous), mib(process_memory().peak), totals.over_two_calls,
@@ -145,6 +146,7 @@ std::string text_from(const FlightTotals& totals, const Options& options) {
 ordered_json json_from(const FlightTotals& totals, const Options& options) {
   const FlightSummary summary = summary_of(totals);
   return {{"archive", options.archives[0]},
+          {"driver", driver_name()},
           {"frames", summary.frames},
           {"mean_ms", summary.mean_ms},
           {"median_ms", summary.median_ms},

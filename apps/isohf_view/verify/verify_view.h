@@ -32,7 +32,8 @@ struct ViewChecks {
   std::optional<isohf::TileRange> tiles;
   /// Of them one in so many along each row and column, rows of shadows and blocks of seams; 1: all.
   std::int64_t every = 1;
-  /// Called now and then with what is looked at, how much of it has been, and all of it.
+  /// Called now and then with what is looked at, how much of it has been, and all of it; of several threads, one at a
+  /// time.
   std::function<void(const char*, std::int64_t, std::int64_t)> progress;
 };
 
@@ -59,6 +60,8 @@ struct ViewReport {
     ++failures;
     if (findings.size() < kMaxFindings) findings.push_back(std::move(finding));
   }
+  /// Takes over what another check of the same archive has looked at and found.
+  void add(const ViewReport& other);
 };
 
 /// "shared vertices", ...: what a check looks at, by the id of its findings.
@@ -67,7 +70,8 @@ struct ViewReport {
 /// Draws every tile at every level, whole and fractional, through the buffers, shaders and index arrays that pictures
 /// are drawn with, and compares what comes back with the library's own arithmetic. A GL context must be current. Of more
 /// than kAllPictures tiles all vertices and index arrays are looked at, and pictures in turn: each tile at one level and
-/// in one transition, each row of shadows under one sun from either side, each block of seams at one pair of levels.
+/// in one transition, each row of shadows under one sun from either side, each block of seams at one pair of levels; tiles,
+/// shadows and seams then have a thread and a headless context each.
 ///
 /// arrays  what SharedGeometry uploads; make_index_arrays(shape) unless a fault is wanted
 /// The oracles never look at the arrays: level λ is the barycentric surface of a coarse tile. A tile that cannot be
