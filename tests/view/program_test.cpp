@@ -301,6 +301,12 @@ TEST_F(ViewProgramTest, ShowsARasterAndLeavesNothingBehind) {
   EXPECT_TRUE(is_png("coast.png"));
   EXPECT_NE(drawn.out.find("coast_512x384_int16.tif"), std::string::npos) << drawn.out;
   EXPECT_TRUE(std::filesystem::is_empty(folder));
+  // What is asked of its maps later on is known all the same.
+  const Outcome place = run(raster + " --probe 3000,3000", "TMPDIR=" + folder);
+  EXPECT_NE(place.out.find("47.796197 N  12.369345 E"), std::string::npos) << place.out << place.err;
+  const Outcome day =
+      run(raster + " -q --size 64x48 --date 2026-06-21 --screenshot " + path("day.png"), "TMPDIR=" + folder);
+  EXPECT_EQ(day.exit_code, 0) << day.err;
   const std::string bytes = test::read_file(raster);
   test::write_file(path("cut.tif"), bytes.substr(0, 3000));
   const Outcome cut = run(path("cut.tif") + " --size 64x48 --screenshot " + path("cut.png"), "TMPDIR=" + folder);

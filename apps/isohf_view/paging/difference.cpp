@@ -32,22 +32,26 @@ double unit_between(const Metadata& first, const Metadata& second) {
 
 }  // namespace
 
-std::optional<WorldGeoreference> understood_places(const std::string& path) {
-  ArchiveReader archive(path);
+ArchiveReader understood(const ArchiveReader& archive) {
+  ArchiveReader another({std::shared_ptr<void>(), &archive.source()}, archive.path());
   try {
-    understand_source(archive);
+    understand_source(another);
   } catch (const Error&) {
-    // Places have no longitude and latitude then.
+    // Places have no longitude and latitude then, nor one in the sky.
   }
+  return another;
+}
+
+std::optional<WorldGeoreference> understood_places(const ArchiveReader& archive) {
   try {
-    return WorldGeoreference(archive.metadata());
+    return WorldGeoreference(understood(archive).metadata());
   } catch (const Error&) {
     return std::nullopt;  // nor coordinates
   }
 }
 
 WorldJoin::WorldJoin(const ArchiveReader& from, const ArchiveReader& to)
-    : from_(understood_places(from.path())), to_(understood_places(to.path())) {
+    : from_(understood_places(from)), to_(understood_places(to)) {
   const std::string& body = from.metadata().source.body;
   const std::string& other = to.metadata().source.body;
   if (!body.empty() && !other.empty() && body != other) {

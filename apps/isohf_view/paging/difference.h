@@ -12,9 +12,11 @@
 
 namespace isohf::view {
 
-/// Where an archive's world lies, its reference systems understood as far as can be; nullopt where that is not known. May
-/// load PROJ.
-[[nodiscard]] std::optional<WorldGeoreference> understood_places(const std::string& path);
+/// Another reader of the same bytes, whatever its file's name has become: one whose reference systems are understood as far
+/// as can be, which may load PROJ. `archive`, which several threads may be reading, outlives it.
+[[nodiscard]] ArchiveReader understood(const ArchiveReader& archive);
+/// Where an archive's world lies; nullopt where that is not known.
+[[nodiscard]] std::optional<WorldGeoreference> understood_places(const ArchiveReader& archive);
 
 /// Places of one archive's world in another's: by the coordinates that both have, else by longitude and latitude; the same
 /// numbers where neither says where it lies.

@@ -97,7 +97,7 @@ class ArchiveSource final : public TileSource {
       difference_->take_from({&place.at, 1}, {&difference, 1});
       if (!std::isnan(difference)) place.difference = difference;
     }
-    std::call_once(georeference_once_, [this] { georeference_ = understood_places(reader_.path()); });
+    std::call_once(georeference_once_, [this] { georeference_ = understood_places(reader_); });
     if (!georeference_) return place;
     if (georeference_->has_source() && reader_.metadata().source.crs_unit != "degree") {
       place.map = georeference_->source_from_world(place.at);
@@ -109,15 +109,7 @@ class ArchiveSource final : public TileSource {
   }
   [[nodiscard]] double world_per_elevation() const override { return world_per_elevation_; }
   [[nodiscard]] const Metadata* metadata() const override { return &reader_.metadata(); }
-  [[nodiscard]] DaySky sky() const override {
-    ArchiveReader archive(reader_.path());
-    try {
-      understand_source(archive);
-    } catch (const Error&) {
-      // Then it has no place in the sky, which the next line says.
-    }
-    return DaySky(archive);
-  }
+  [[nodiscard]] DaySky sky() const override { return DaySky(understood(reader_)); }
   [[nodiscard]] const ArchiveReader* archive() const override { return &reader_; }
   [[nodiscard]] std::optional<double> difference_range() const override {
     return difference_ ? std::optional(difference_->range()) : std::nullopt;
