@@ -17,8 +17,9 @@ void run_window(const Options& options);
 /// before each frame and may throw. Throws Error{kCorrupt} where a tile cannot be read.
 void fly(const TileSource& source, const Options& options, const std::function<void()>& poll);
 
-/// Sweeps through the levels of detail, fading and switching, prints how the picture changes, and writes --csv.
-void sweep(const TileSource& source, const Options& options);
+/// Sweeps through the levels of detail, fading and switching, prints how the picture changes, and writes --csv. `poll` as
+/// in fly().
+void sweep(const TileSource& source, const Options& options, const std::function<void()>& poll);
 
 /// Prints an action's result as --json and --quiet ask for; `json` makes the document where it is wanted.
 void print_result(const cli::CommonOptions& common, const std::string& text,

@@ -15,6 +15,7 @@ constexpr double kFlat = 0.01;
 constexpr double kSteep = 0.5;
 constexpr double kHilly = 0.2;            ///< what ground of no known proportion is drawn with at most
 constexpr double kSteepest_rad = 1.5707;  // straight down has no heading
+constexpr double kStraight = 1e-6;
 
 /// Turns a vector about an axis of length 1, counter-clockwise seen against the axis.
 Vec3 turned(Vec3 v, Vec3 axis, double angle_rad) {
@@ -37,7 +38,8 @@ void Camera::look_at(Vec3 from, Vec3 target) {
   eye = from;
   const Vec3 way = target - from;
   const double distance = std::max(length(way), 1e-9);
-  if (way.x != 0.0 || way.z != 0.0) heading_rad = std::atan2(way.x, -way.z);
+  // Straight down North is up.
+  heading_rad = std::hypot(way.x, way.z) > kStraight * distance ? std::atan2(way.x, -way.z) : 0.0;
   pitch_rad = std::clamp(std::asin(std::clamp(way.y / distance, -1.0, 1.0)), -kSteepest_rad, kSteepest_rad);
 }
 

@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <map>
 #include <memory>
@@ -38,8 +39,11 @@ std::function<void()> interrupt_check() {
 
 int take_screenshot(const TileSource& source, const Options& options) {
   Session session(source, options);
+  session.poll = interrupt_check();
   const Offscreen target(options.view.width, options.view.height, GL_RGBA8, options.samples.value_or(kPictureSamples));
   session.complete_frame();
+  glFinish();
+  session.poll();
   if (session.is_cut() && !options.common.quiet) {
     cli::print_warning(
         fmt::format("--memory {}M holds the tiles within {:.0f} world units of the eye; what lies beyond is left out",
@@ -47,7 +51,7 @@ int take_screenshot(const TileSource& source, const Options& options) {
   }
   target.bind_joined();
   if (options.legend) session.draw_legend();
-  write_picture(options.screenshot, target.width(), target.height());
+  write_picture(options.screenshot, target.width(), target.height(), options.overwrite);
   print_result(options.common, "", [&] {
     return ordered_json{{"archive", options.archives[0]}, {"screenshot", options.screenshot},
                         {"driver", driver_name()},        {"width", target.width()},
@@ -158,9 +162,19 @@ int say_place(const TileSource& source, const Options& options) {
   std::string text;
   for (const Place& place : places) text += fmt::format("{}\n", fmt::join(lines_of(place), "\n"));
   if (profile) {
-    text += describe_length(profile->length, source.ground_unit()) + " from the first to the second\n";
+    text += describe_length(profile->length, source.ground_unit()) + " from the first to the second";
+    std::vector<double> heights = profile->heights;
+    std::erase_if(heights, [](double height) { return std::isnan(height); });
+    if (!heights.empty()) {
+      const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
+      text += fmt::format(", over elevations from {:.6g} to {:.6g} {}", *low, *high, short_unit(source.height_unit()));
+      if (text.back() == ' ') text.pop_back();
+    }
+    text += "\n";
   }
-  print_result(options.common, text, [&] {
+  cli::CommonOptions answers = options.common;
+  answers.quiet = false;  // what is asked for is said
+  print_result(answers, text, [&] {
     ordered_json json{{"archive", options.archives[0]}, {"places", ordered_json::array()}};
     for (const Place& place : places) json["places"].push_back(json_of(place));
     if (profile) json["profile"] = json_of(*profile);
@@ -173,6 +187,7 @@ int run(const cli::Arguments& arguments) {
   if (const char* folder = std::getenv("ISOHF_MODULE_PATH"); folder != nullptr) set_module_folder(folder);
   const std::optional<Options> options = parse_options(arguments);
   if (!options) return cli::kExitDone;
+  static_cast<void>(cli::watch_interrupts());  // from here on
   // A flight's pictures are looked at one by one.
   const bool is_picture = !options->screenshot.empty() && options->action != Options::Action::kFlight;
   for (const std::string& output : {is_picture ? options->screenshot : std::string(), options->csv, options->plot}) {
@@ -197,7 +212,7 @@ int run(const cli::Arguments& arguments) {
       fly(*source, *options, interrupt_check());
       return cli::kExitDone;
     default:
-      sweep(*source, *options);
+      sweep(*source, *options, interrupt_check());
       return cli::kExitDone;
   }
 }

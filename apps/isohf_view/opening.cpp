@@ -110,10 +110,10 @@ Opened open_shown(const std::string& name, const Options& options, const std::st
   // An open file outlives its name: what is converted leaves nothing behind, however the program ends.
   const auto shown = convert_for_viewing(name, options);
   if (second.empty()) {
-    opened.source = shown ? open_archive(shown->path()) : open_unconverted(name, {});
+    opened.source = shown ? open_archive(shown->path(), {}, name) : open_unconverted(name, {});
   } else {
     const auto other = convert_for_viewing(second, options);
-    opened.source = open_archive(shown ? shown->path() : name, other ? other->path() : second);
+    opened.source = open_archive(shown ? shown->path() : name, other ? other->path() : second, shown ? name : "");
   }
   return opened;
 }

@@ -1,5 +1,7 @@
 #include "options.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -41,6 +43,12 @@ Examples:
   isohf view dem.isohf --flight path.txt --frames 600 --csv frames.csv
   isohf view dem.isohf --verify
   isohf view before.isohf after.isohf --difference)";
+
+/// Below that what is written lies on itself.
+constexpr struct {
+  int width = 320;
+  int height = 200;
+} kLegend_px;
 
 [[noreturn]] void refuse(const std::string& text, const std::string& required) {
   throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be " + required);
@@ -153,7 +161,7 @@ void add_picture(CommandLine& line, Options& options) {
     options.view.width = static_cast<int>(width);
     options.view.height = static_cast<int>(height);
   });
-  line.option("--position", "X,Y,Z", "Put the eye there",
+  line.option("--position", "X,Y,Z", "Put the eye there; Y is an elevation, and drawn exaggerated as the ground is",
               [&](const std::string& text) { options.position = parse_place(text); });
   line.option("--look-at", "X,Y,Z", "Look there",
               [&](const std::string& text) { options.look_at = parse_place(text); });
@@ -256,6 +264,9 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   needs("--csv", flies || sweep, "--flight or --sweep");
   needs("--steps", sweep, "--sweep");
   needs("--legend", !options.screenshot.empty() && !window, "--screenshot without --window");
+  if (options.legend && (options.view.width < kLegend_px.width || options.view.height < kLegend_px.height)) {
+    line.fail(fmt::format("--legend needs pictures of at least {}x{} (--size)", kLegend_px.width, kLegend_px.height));
+  }
   needs("--tiles", verify, "--verify");
   needs("--every", verify, "--verify");
   needs("--time", options.date.has_value(), "--date");
@@ -273,6 +284,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   if (flies) options.action = Options::Action::kFlight;
   if (verify) options.action = Options::Action::kVerify;
   if (sweep) options.action = Options::Action::kSweep;
+  needs("--frames", options.action == Options::Action::kWindow || flies, "--flight or a window");
   if (options.archives.size() == 2 && !options.difference && options.action != Options::Action::kWindow) {
     line.fail("a second archive needs a window or --difference");
   }

@@ -43,12 +43,12 @@ void main() {
 /// Of the Earth, and where the body is not known; of Mars, whose dust scatters; of bodies without air.
 constexpr Air kEarthAir{{0.62, 0.70, 0.78}, {0.16, 0.30, 0.55}, {0.33, 0.39, 0.48}};
 constexpr Air kDust{{0.72, 0.60, 0.47}, {0.47, 0.36, 0.28}, {0.42, 0.38, 0.35}};
-constexpr Air kNoAir{{0.07, 0.08, 0.10}, {0.03, 0.03, 0.04}, {0.34, 0.34, 0.36}};
+constexpr Air kNoAir{{0.07, 0.08, 0.10}, {0.03, 0.03, 0.04}, {0.34, 0.34, 0.36}, false};
 
 Air air_of(const Metadata* metadata) {
-  const std::string body = metadata == nullptr ? "" : metadata->source.body;
-  if (body == "Mars") return kDust;
-  return body.empty() || body == "Earth" || body == "Venus" || body == "Titan" ? kEarthAir : kNoAir;
+  if (metadata == nullptr) return kEarthAir;
+  if (metadata->source.body == "Mars") return kDust;
+  return has_air(*metadata) ? kEarthAir : kNoAir;
 }
 
 void set_vec3(GLint place, Vec3 value) {
@@ -72,7 +72,7 @@ void set_light(const AnyProgram& program, const ViewState& view, const Air& air)
   const Vec3 sun = normalised(view.sun);
   set_vec3(program.uniform("sun"), sun);
   const double height = std::clamp(sun.y * 2.5, 0.0, 1.0);
-  const Vec3 warm{1.0, 0.62 + height * 0.34, 0.36 + height * 0.52};
+  const Vec3 warm = air.reddens ? Vec3{1.0, 0.62 + height * 0.34, 0.36 + height * 0.52} : Vec3{0.95, 0.95, 0.95};
   set_vec3(program.uniform("sun_light"), (sun.y > 0.0 ? 0.95 : 0.0) * warm);
   set_vec3(program.uniform("sky_light"), std::clamp(sun.y * 6.0 + 0.25, 0.12, 1.0) * air.light);
   set_vec3(program.uniform("horizon"), by_day(air.horizon, sun));

@@ -29,6 +29,7 @@ struct Air {
   Vec3 horizon;
   Vec3 zenith;
   Vec3 light;
+  bool reddens = true;  ///< the light of a low sun
 };
 
 /// What one frame drew.

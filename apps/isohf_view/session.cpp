@@ -22,10 +22,18 @@ std::uint64_t texture_bytes(const TileSource& source, const Options& options) {
   return source.textures() == nullptr ? 0 : (options.memory_mib << 20) / 3 * 2;
 }
 
+constexpr double kFromAbove_rad = -1.4;
+
+/// Four in each plane's box, and what is on its way.
+constexpr std::uint64_t kTilesAtLeast = 6;
+
 TileBoxLimits limits_from(const TileSource& source, const Options& options) {
   TileBoxLimits limits;
   limits.memory_bytes = (options.memory_mib << 20) - texture_bytes(source, options);
   limits.upload_bytes_per_frame = options.upload_mib << 20;
+  const std::uint64_t boxes = source.planes() == nullptr ? 1 : static_cast<std::uint64_t>(source.planes()->count()) + 1;
+  const std::uint64_t least = kTilesAtLeast * boxes * TileBox::most_bytes_of_a_tile(source);
+  limits.enough_mib = options.archives.size() * (source.textures() == nullptr ? 1 : 3) * ((least >> 20U) + 1);
   const int cores = static_cast<int>(std::thread::hardware_concurrency());
   limits.workers = options.threads > 0 ? options.threads : std::max(1, cores - 1);
   return limits;
@@ -128,6 +136,8 @@ Session::Session(const TileSource& source, const Options& options)
   if (options.position || options.look_at) {
     camera.look_at(options.position ? from_archive(*options.position) : camera.eye,
                    options.look_at ? from_archive(*options.look_at) : target);
+    // Nobody asked for the turn of a view from above.
+    if (!options.look_at && camera.pitch_rad < kFromAbove_rad) camera.heading_rad = 0.0;
   }
 }
 
@@ -170,6 +180,14 @@ void Session::look_as(const Session& other) {
   shadows = other.shadows;
   far_distance_ = other.far_distance_;
   camera = other.camera;
+  time_.reset();
+  if (!other.time_) return;
+  try {
+    begin_day(*other.time_);
+  } catch (const Error&) {
+    // Where the sun's way is not known it stays where it stood.
+  }
+  sun_before_ = other.sun_before_;
 }
 
 Vec3 Session::from_archive(Vec3 at) const {
@@ -254,14 +272,15 @@ void Session::frame() {
 }
 
 void Session::complete_frame() {
+  poll();
   prepare();
-  boxes_.finish(view, reach_wanted_);
+  boxes_.finish(view, reach_wanted_, poll);
   if (boxes_.error()) throw Error(ErrorCode::kCorrupt, *boxes_.error());
   if (shows_textures()) {
-    textures_->finish(boxes_.finest(), view);
+    textures_->finish(boxes_.finest(), view, poll);
     if (textures_->error()) throw Error(ErrorCode::kCorrupt, *textures_->error());
     if (texture_overview_) {
-      texture_overview_->finish();
+      texture_overview_->finish(poll);
       if (texture_overview_->error()) throw Error(ErrorCode::kCorrupt, *texture_overview_->error());
     }
   }
@@ -314,6 +333,8 @@ void Session::draw_overlay(const Shown& shown) {
       if (shows_textures() && textures_->error()) lines.push_back(*textures_->error());
       if (cut_) lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
       if (boxes_.error()) lines.push_back(*boxes_.error());
+    } else if (view.exaggeration != 1.0) {
+      lines.push_back(fmt::format("heights x {:.3g}", view.exaggeration));
     }
     lines.insert(lines.end(), shown.place.begin(), shown.place.end());
     if (view.mode == ColourMode::kElevation || view.mode == ColourMode::kDifference) reading.colours = legend_.stops;
@@ -324,7 +345,7 @@ void Session::draw_overlay(const Shown& shown) {
     reading.world_per_px = shown.middle_distance / view.focal_px();
     reading.heading_rad = camera.heading_rad;
   }
-  reading.hours = hours();
+  if (shown.figures != Figures::kLegend) reading.hours = hours();
   reading.profile = shown.profile;
   for (const Vec3 at : shown.way) reading.way.push_back(project(camera, view, at));
   hud_.draw(reading, view.width, view.height, shown.screen_scale);
@@ -334,8 +355,9 @@ void Session::draw_legend() {
   Ground ground(source_);
   Shown shown;
   shown.figures = Figures::kLegend;
-  const auto middle = Steering(source_, ground, camera, view).pick({0.5 * view.width, 0.5 * view.height});
+  const auto middle = Steering(source_, ground, camera, view).middle();
   if (middle) shown.middle_distance = true_distance(*middle);
+  shown.screen_scale = std::max(1.0, std::min(view.width, view.height) / 720.0);
   draw_overlay(shown);
 }
 

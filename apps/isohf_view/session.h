@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -28,7 +29,7 @@ class Session {
 
   /// Updates the tile box and draws a frame into the bound framebuffer; never waits for a tile.
   void frame();
-  /// Waits for all tiles in reach first. Throws Error{kCorrupt} where one cannot be read.
+  /// Waits for all tiles in reach first, and calls poll() meanwhile. Throws Error{kCorrupt} where one cannot be read.
   void complete_frame();
   /// Changes the far distance by a factor.
   void scale_far(double factor) { far_distance_ = view.far_distance * factor; }
@@ -66,9 +67,10 @@ class Session {
   /// Other colours of the ground; those that the source has.
   void set_mode(ColourMode mode);
   [[nodiscard]] std::vector<ColourMode> modes() const;
-  /// Takes camera, light and all switches from another session; its own colours where they are those of a difference.
+  /// Takes camera, light, its day and all switches from another session; its own colours where they are those of a difference.
   void look_as(const Session& other);
 
+  std::function<void()> poll = [] {};  ///< may throw, as where the program was interrupted
   Camera camera;
   ViewState view;  ///< the mode by set_mode()
   double sun_azimuth_deg;

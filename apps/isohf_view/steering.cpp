@@ -56,6 +56,12 @@ Vec3 Steering::hold(PicturePoint at) {
           0.5 * (covered.z0 + covered.z1)};
 }
 
+std::optional<Vec3> Steering::middle() {
+  const Vec3 there = hold({0.5 * view_.width, 0.5 * view_.height});
+  const auto at = project(camera_, view_, there);
+  return at && at->y < view_.height ? std::optional(there) : std::nullopt;
+}
+
 std::optional<double> Steering::ground_under_eye() {
   const WorldPoint at{camera_.eye.x, camera_.eye.z};
   const auto highest = ground_.highest(at);

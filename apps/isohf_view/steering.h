@@ -39,6 +39,9 @@ class Steering {
   [[nodiscard]] Vec3 hold(PicturePoint at);
   /// The ground under the cursor alone.
   [[nodiscard]] std::optional<Vec3> pick(PicturePoint at);
+  /// Where lengths are those of the scale bar: the ground in the middle of the picture, else nearest below it; nullopt where
+  /// none is in sight.
+  [[nodiscard]] std::optional<Vec3> middle();
   /// Height of the eye above the ground under it; above the lowest ground where there is none.
   [[nodiscard]] double height_above_ground();
   /// What the eye keeps from the ground.

@@ -155,8 +155,7 @@ class Controls {
     shown.figures = show_figures;
     shown.help = show_help;
     shown.screen_scale = screen_scale();
-    const ViewState& view = session_.view;
-    const auto middle = steering_.pick({0.5 * view.width, 0.5 * view.height});
+    const auto middle = steering_.middle();
     if (middle) shown.middle_distance = session_.true_distance(*middle);
     const auto there = inside_ ? steering_.pick(cursor_) : std::nullopt;
     if (!message.empty()) shown.place.push_back(message);
@@ -366,7 +365,8 @@ class Controls {
       session_.begin_day({static_cast<int>(today.year()), static_cast<int>(static_cast<unsigned>(today.month())),
                           static_cast<int>(static_cast<unsigned>(today.day()))});
     } catch (const Error& error) {
-      cli::print_note(error.what());
+      message = error.what();
+      cli::print_note(message);
     }
   }
 
@@ -613,15 +613,21 @@ void run_window(const Options& options) {
     if (controls.wants_picture) {
       controls.wants_picture = false;
       const std::string name = std::filesystem::absolute(next_picture_name()).string();
-      picture->write_picture(name);
-      controls.message = "wrote " + name;
-      if (!options.common.quiet) cli::print_note("wrote " + name);
+      try {
+        picture->write_picture(name, false);
+        controls.message = "wrote " + name;
+      } catch (const Error& error) {
+        controls.message = error.what();
+      }
+      if (!options.common.quiet) cli::print_note(controls.message);
     }
     picture->show();
     Session::Shown shown = controls.shown();
     shown.frames_per_second = 1.0 / smooth_s;
     session.draw_overlay(shown);
-    if (is_last && !options.screenshot.empty()) write_picture(options.screenshot, width, height);
+    if (is_last && !options.screenshot.empty()) {
+      write_picture(options.screenshot, width, height, options.overwrite);
+    }
     glfwSwapBuffers(window.get());
     if (moves) drawing_s = std::chrono::duration<double>(Clock::now() - now).count();
     if (is_last) break;

@@ -338,6 +338,7 @@ TEST_F(ViewProgramTest, WritesALegendOnPictures) {
   const Outcome written = run(shot + " --legend");
   EXPECT_EQ(written.exit_code, 0) << written.err;
   EXPECT_NE(text("legend.png"), bare);
+  EXPECT_EQ(run(path("good.isohf") + " --size 64x48 --legend --screenshot " + path("small.png")).exit_code, 2);
   EXPECT_EQ(run(path("good.isohf") + " --legend --verify").exit_code, 2);
 }
 
@@ -380,7 +381,8 @@ TEST_F(ViewProgramTest, SaysWhatIsKnownOfAPlace) {
   EXPECT_TRUE(place.at("elevation").is_number());
   const Outcome two = run(path("good.isohf") + " --probe 480,300,480,340");
   EXPECT_NE(two.out.find("\n40 "), std::string::npos) << two.out;
-  EXPECT_EQ(run(path("good.isohf") + " --probe -5,0 -q").out, "");
+  EXPECT_NE(two.out.find(", over elevations from "), std::string::npos) << two.out;
+  EXPECT_EQ(run(path("good.isohf") + " --probe -5,0 -q").out, "x -5  z 0  outside\n");
   const Outcome wrong = run(path("good.isohf") + " --probe 3");
   EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_NE(wrong.err.find("--probe: found '3', must be X,Z or X,Z,X,Z"), std::string::npos) << wrong.err;
@@ -589,6 +591,91 @@ TEST_F(ViewProgramTest, TellsTwoSurfacesApart) {
       run(ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif " + path("far.isohf") + " --difference" + shot);
   EXPECT_EQ(map.exit_code, 2);
   EXPECT_NE(map.err.find("no place is known in both"), std::string::npos) << map.err;
+}
+
+/// docs/schema/view.json lists what is printed, member by member.
+TEST_F(ViewProgramTest, DocumentsAreWhatTheirSchemaSays) {
+  if (std::system("python3 -c 'import jsonschema' >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "python3-jsonschema is not installed";
+  }
+  std::filesystem::create_directory(path("documents"));
+  int number = 0;
+  const auto keep = [&](const std::string& action, int exit_code, const std::string& before = "") {
+    const Outcome said = run(path("good.isohf") + " --json --size 64x48 " + action, before);
+    EXPECT_EQ(said.exit_code, exit_code) << said.err;
+    test::write_file(path("documents/") + (exit_code == 2 ? "error." : "view.") + std::to_string(++number) + ".json",
+                     said.out);
+  };
+  test::write_file(path("way.txt"), "0 100 200 600  480 0 100\n2 500 150 500  480 0 0\n");
+  keep("--screenshot " + path("a.png"), 0);
+  keep("--probe 480,300", 0);
+  keep("--probe=480,300,-60,60", 0);
+  keep("--verify", 0);
+  keep("--sweep --steps 4", 0);
+  keep("--flight " + path("way.txt") + " --frames 3 --baseline", 0);
+  keep("--legend --screenshot " + path("small.png"), 2);
+  if (std::system("command -v xvfb-run >/dev/null 2>&1") == 0) {
+    keep("--window --frames 3", 0, "xvfb-run -a -s '-screen 0 800x600x24'");
+  }
+  const Outcome valid =
+      test::run_program({"/usr/bin/env", "python3", "-B", ISOHF_SOURCE_DIR "/tests/cli/output/validate_documents.py",
+                         ISOHF_SOURCE_DIR "/docs/schema", path("documents")});
+  EXPECT_EQ(valid.exit_code, 0) << valid.out << valid.err;
+}
+
+/// Nor is a picture begun that nobody waits for any more.
+TEST_F(ViewProgramTest, EndsWith130WhereItIsInterrupted) {
+  const std::pair<const char*, const char*> kCases[] = {
+      {"INT", "--sweep --steps 10000 --size 640x480"},
+      {"TERM", "--screenshot big.png --size 4096x4096 --samples 8"},
+  };
+  for (const std::string& what :
+       {path("good.isohf"), std::string(ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif")}) {
+    for (const auto& [signal, action] : kCases) {
+      SCOPED_TRACE(what + " " + action);
+      const Outcome stopped =
+          test::run_program({"/bin/sh", "-c",
+                             "cd '" + path("") + "' && timeout --preserve-status -s " + signal +
+                                 " 1.5 '" ISOHF_BIN_DIR "/isohf-view' '" + what + "' -q " + action});
+      // A fast machine has drawn the picture by then.
+      const bool is_drawn = std::filesystem::exists(path("big.png"));
+      EXPECT_EQ(stopped.exit_code, is_drawn ? 0 : 130) << stopped.err;
+      std::filesystem::remove(path("big.png"));
+    }
+  }
+}
+
+/// In the window, which stays.
+TEST_F(ViewProgramTest, APictureThatCannotBeKeptEndsNothing) {
+  if (std::system("command -v xvfb-run >/dev/null 2>&1 && command -v xdotool >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "xvfb-run or xdotool is not installed";
+  }
+  test::write_file(path("keep.sh"), R"sh(
+    cd /proc
+    "$1" "$2" --size 200x150 2>"$3" & viewer=$!
+    id=$(timeout 30 xdotool search --sync --onlyvisible --name isohf-view | head -1)
+    xdotool windowfocus "$id" sleep 1 key p
+    for wait in $(seq 100); do grep -q isohf-0001 "$3" && break; sleep 0.1; done
+    xdotool key Escape
+    wait $viewer
+  )sh");
+  const Outcome outcome =
+      test::run_program({"/usr/bin/env", "xvfb-run", "-a", "-s", "-screen 0 400x300x24", "sh", path("keep.sh"),
+                         ISOHF_BIN_DIR "/isohf-view", path("good.isohf"), path("err")});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err << text("err");
+  EXPECT_NE(text("err").find("isohf-0001.png"), std::string::npos) << text("err");
+  EXPECT_EQ(text("err").find("wrote"), std::string::npos) << text("err");
+}
+
+TEST_F(ViewProgramTest, SaysHowMuchMemoryWouldDo) {
+  test::write_analytic_archive(path("large.isohf"), TileGrid::make(TileShape::make(212, 243, 4), 3, 3, 320.0, 320.0));
+  const std::string shot = path("large.isohf") + " --size 64x48 --screenshot " + path("m.png") + " --memory ";
+  const Outcome little = run(shot + "1M");
+  EXPECT_EQ(little.exit_code, 2) << little.err;
+  const std::size_t at = little.err.rfind("--memory ");
+  ASSERT_NE(at, std::string::npos) << little.err;
+  const Outcome enough = run(shot + std::to_string(std::stoi(little.err.substr(at + 9))) + "M");
+  EXPECT_EQ(enough.exit_code, 0) << enough.err;
 }
 
 TEST_F(ViewProgramTest, OpensAWindow) {

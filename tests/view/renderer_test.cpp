@@ -267,5 +267,31 @@ TEST_F(RendererTest, FadesBetweenLevelsWithoutJumps) {
   RecordProperty("plain", plain.largest_jump);
 }
 
+TEST_F(RendererTest, AnotherArchivesSessionTakesTheDayAlong) {
+  const auto source = open_archive(ISOHF_SOURCE_DIR "/testdata/archives/v1/projected.isohf");
+  Options morning;
+  morning.date = SolarTime{2026, 6, 21, 9.0};
+  Session first(*source, morning);
+  first.set_hours(18.5);
+  Session second(*source, morning);
+  second.look_as(first);
+  EXPECT_EQ(second.hours(), 18.5);
+  EXPECT_EQ(second.sun_azimuth_deg, first.sun_azimuth_deg);
+  first.leave_day();
+  second.leave_day();
+  EXPECT_EQ(second.sun_elevation_deg, first.sun_elevation_deg) << "the sun of before";
+  second.look_as(first);
+  EXPECT_FALSE(second.hours());
+}
+
+TEST(Camera, LooksStraightDownWithNorthUp) {
+  Camera camera;
+  camera.heading_rad = 2.0;
+  camera.look_at({100.0, 5000.0, 100.0}, {100.0, 0.0, 100.0});
+  EXPECT_EQ(camera.heading_rad, 0.0);
+  camera.look_at({100.0, 5000.0, 100.0}, {101.0, 0.0, 100.0});
+  EXPECT_GT(camera.heading_rad, 1.5) << "East is looked at";
+}
+
 }  // namespace
 }  // namespace isohf::view

@@ -176,9 +176,9 @@ void Offscreen::bind_joined() const {
   resolved_->bind();
 }
 
-void Offscreen::write_picture(const std::string& path) const {
+void Offscreen::write_picture(const std::string& path, bool overwrite) const {
   bind_joined();
-  view::write_picture(path, width_, height_);
+  view::write_picture(path, width_, height_, overwrite);
 }
 
 std::vector<std::uint8_t> Offscreen::read_rgba8() const {
@@ -207,7 +207,7 @@ std::vector<std::uint8_t> read_pixels(int width, int height) {
   return pixels;
 }
 
-void write_picture(const std::string& path, int width, int height) {
+void write_picture(const std::string& path, int width, int height, bool overwrite) {
   const std::vector<std::uint8_t> rgba = read_pixels(width, height);
   std::vector<std::uint8_t> rgb;
   rgb.reserve(rgba.size() / 4 * 3);
@@ -217,7 +217,7 @@ void write_picture(const std::string& path, int width, int height) {
   spec.height = height;
   spec.sample_type = SampleType::kUint8;
   spec.channels = 3;
-  spec.overwrite = true;
+  spec.overwrite = overwrite;
   const auto sink = create_raster(path, spec);
   sink->write_rows(std::as_bytes(std::span(rgb)));
   sink->finish();

@@ -45,7 +45,7 @@ class Offscreen {
   /// Binds the picture with each pixel's samples joined, to be read or written over.
   void bind_joined() const;
   /// As view::write_picture.
-  void write_picture(const std::string& path) const;
+  void write_picture(const std::string& path, bool overwrite = true) const;
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
 
@@ -66,7 +66,7 @@ class Offscreen {
 /// The bound framebuffer's pixels, rows from the top, four channels a pixel.
 [[nodiscard]] std::vector<std::uint8_t> read_pixels(int width, int height);
 
-/// Writes the bound framebuffer as an opaque RGB PNG file, in place of one of that name. Throws Error{kIo} naming it.
-void write_picture(const std::string& path, int width, int height);
+/// Writes the bound framebuffer as an opaque RGB PNG file, in place of one of that name or not. Throws Error{kIo} naming it.
+void write_picture(const std::string& path, int width, int height, bool overwrite = true);
 
 }  // namespace isohf::view

@@ -378,6 +378,7 @@ void fly(const TileSource& source, const Options& options, const std::function<v
       "texture_bytes,"
       "textures_to_come");
   Session session(source, options);
+  session.poll = poll;
   const bool films = !options.screenshot.empty();
   const Offscreen target(options.view.width, options.view.height, GL_RGBA8, films ? options.samples.value_or(4) : 1);
   FlightTotals totals;
@@ -407,7 +408,7 @@ void fly(const TileSource& source, const Options& options, const std::function<v
       check_raster_target(numbered, options.overwrite);
       target.bind_joined();
       if (options.legend) session.draw_legend();
-      write_picture(numbered, target.width(), target.height());
+      write_picture(numbered, target.width(), target.height(), options.overwrite);
     }
     const FrameFigures& figures = session.figures();
     const TileBoxFigures& box = session.boxes().figures();

@@ -10,8 +10,9 @@ namespace isohf::view {
 
 using nlohmann::ordered_json;
 
-void sweep(const TileSource& source, const Options& options) {
+void sweep(const TileSource& source, const Options& options, const std::function<void()>& poll) {
   Session session(source, options);
+  session.poll = poll;
   const SweepResult fading = sweep_levels(session, options.sweep_steps, false);
   const SweepResult plain = sweep_levels(session, options.sweep_steps, true);
   std::string csv = "level,fading_largest_jump,fading_mean_jump,fading_from_start,plain_largest_jump,plain_mean_jump\n";

@@ -96,7 +96,8 @@ SurfaceDifference::SurfaceDifference(const ArchiveReader& first, const std::stri
   for (double& value : found) value = std::abs(value);
   const auto most = found.begin() + static_cast<std::ptrdiff_t>(kWithin * static_cast<double>(found.size() - 1));
   std::nth_element(found.begin(), most, found.end());
-  if (*most > 0.0) range_ = round_length(*most);
+  // Two ways of rounding make no difference.
+  if (*most > 1e-6 * first.metadata().quantisation.scale) range_ = round_length(*most);
   if (range_ < *most) range_ = round_length(2.6 * range_);
 }
 

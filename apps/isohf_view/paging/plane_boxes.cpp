@@ -64,10 +64,10 @@ void PlaneBoxes::update(const ViewState& view, double reach) {
   count();
 }
 
-void PlaneBoxes::finish(const ViewState& view, double reach) {
+void PlaneBoxes::finish(const ViewState& view, double reach, const std::function<void()>& poll) {
   for (int plane = planes_.count(); plane >= 0; --plane) {
     if (const auto wanted = radius(plane, view, reach)) {
-      boxes_[static_cast<std::size_t>(plane)]->finish({view.eye.x, view.eye.z}, *wanted);
+      boxes_[static_cast<std::size_t>(plane)]->finish({view.eye.x, view.eye.z}, *wanted, poll);
     }
   }
   count();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -21,7 +22,7 @@ class PlaneBoxes {
   /// Once a frame. reach  distance from the eye in which anything is wanted
   void update(const ViewState& view, double reach);
   /// Updates until all is resident that is wanted: for pictures, not for frames.
-  void finish(const ViewState& view, double reach);
+  void finish(const ViewState& view, double reach, const std::function<void()>& poll);
 
   [[nodiscard]] const TileSlot* resident(PlaneTile at) const {
     return boxes_[static_cast<std::size_t>(at.plane)]->resident(at.tile);

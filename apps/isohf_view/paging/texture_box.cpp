@@ -284,10 +284,11 @@ void TextureBox::count() {
   figures_.resident_bytes = resident_bytes_ + kOnTheWay * on_the_way_bytes_;
 }
 
-void TextureBox::finish(const TileRange& range, const ViewState& view) {
+void TextureBox::finish(const TileRange& range, const ViewState& view, const std::function<void()>& poll) {
   for (;;) {
     update(range, view, std::uint64_t{64} << 20U);
     if (figures_.to_come == 0) return;
+    poll();
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
 }

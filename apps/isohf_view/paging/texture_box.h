@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -54,7 +55,8 @@ class TextureBox {
   /// Once a frame: keeps the textures of the tiles in `range` as the view wants them. At least a row of texels goes up.
   void update(const TileRange& range, const ViewState& view, std::uint64_t upload_bytes);
   /// Updates until all is there that is wanted: for pictures, not for frames.
-  void finish(const TileRange& range, const ViewState& view);
+  void finish(
+      const TileRange& range, const ViewState& view, const std::function<void()>& poll = [] {});
 
   /// The GL texture of a tile; 0 where there is none (yet).
   [[nodiscard]] GLuint texture(TileIndex tile) const;

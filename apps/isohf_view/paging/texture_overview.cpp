@@ -94,10 +94,11 @@ void TextureOverview::update(std::uint64_t upload_bytes) {
   glBindTexture(GL_TEXTURE_2D, 0);
 }
 
-void TextureOverview::finish() {
+void TextureOverview::finish(const std::function<void()>& poll) {
   for (;;) {
     update(UINT64_MAX);
     if (to_come_ == 0) return;
+    poll();
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
 }

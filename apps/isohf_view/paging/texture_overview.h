@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -22,7 +23,7 @@ class TextureOverview {
   /// Once a frame: takes in what has been read, as far as the frame's budget goes.
   void update(std::uint64_t upload_bytes);
   /// Updates until all is there: for pictures, not for frames.
-  void finish();
+  void finish(const std::function<void()>& poll = [] {});
 
   [[nodiscard]] GLuint texture() const { return texture_.get(); }  ///< 0: none
   [[nodiscard]] std::int64_t to_come() const { return to_come_; }  ///< tiles

@@ -72,10 +72,9 @@ TileBox::TileBox(const TileSource& source, const SharedGeometry& shared, const T
   if (!fits(2, 2)) {
     throw Error(
         ErrorCode::kInvalidArgument,
-        fmt::format(
-            "memory for tiles: --memory leaves them {} bytes; four of them with their shadows, and those on their "
-            "way, take {}",
-            limits.memory_bytes, bytes_of(2, 2) + on_the_way));
+        fmt::format("--memory: {} MiB of it are left for tiles; four of them with their shadows, and those on their "
+                    "way, take more: --memory {}M holds them",
+                    limits.memory_bytes >> 20U, limits.enough_mib));
   }
 }
 
@@ -295,10 +294,11 @@ void TileBox::count() {
       slot_bytes_ * slots + on_the_way_bytes_ * (loader_.in_flight() + waiting_.size()) + sweep_bytes_;
 }
 
-void TileBox::finish(WorldPoint centre, double radius) {
+void TileBox::finish(WorldPoint centre, double radius, const std::function<void()>& poll) {
   for (;;) {
     update(centre, radius, false);
     if (figures_.missing_tiles == 0 && figures_.shadows_to_come == 0) return;
+    poll();
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
 }

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -41,6 +42,7 @@ struct TileBoxLimits {
   std::uint64_t memory_bytes = std::uint64_t{512} << 20;          ///< tiles on the GPU and on their way there
   std::uint64_t upload_bytes_per_frame = std::uint64_t{4} << 20;  ///< at least one tile a frame goes up all the same
   int workers = 2;
+  std::uint64_t enough_mib = 0;  ///< of --memory: what a refusal names
 };
 
 /// What one update did, and where things stand.
@@ -82,7 +84,8 @@ class TileBox {
   void update(WorldPoint centre, double radius) { update(centre, radius, true); }
 
   /// Updates until the box is complete: for pictures, not for frames.
-  void finish(WorldPoint centre, double radius);
+  void finish(
+      WorldPoint centre, double radius, const std::function<void()>& poll = [] {});
 
   /// `radius`, or the most that memory holds the tiles of.
   [[nodiscard]] double fitting_radius(double radius) const;

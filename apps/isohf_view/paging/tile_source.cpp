@@ -22,8 +22,8 @@ namespace {
 
 class ArchiveSource final : public TileSource {
  public:
-  ArchiveSource(const std::string& path, const std::string& second)
-      : reader_(path),
+  ArchiveSource(const std::string& path, const std::string& second, const std::string& name)
+      : reader_(name.empty() ? ArchiveReader(path) : ArchiveReader(open_file_source(path), name)),
         ground_scale_(isohf::ground_scale(reader_.metadata())),
         grid_(scaled(reader_.grid(), ground_scale_)),
         world_per_elevation_(isohf::world_per_elevation(reader_.metadata())) {
@@ -296,8 +296,8 @@ TileBounds whole_bounds(const TileSource& source) {
   return source.whole_;
 }
 
-std::unique_ptr<TileSource> open_archive(const std::string& path, const std::string& second) {
-  return std::make_unique<ArchiveSource>(path, second);
+std::unique_ptr<TileSource> open_archive(const std::string& path, const std::string& second, const std::string& name) {
+  return std::make_unique<ArchiveSource>(path, second, name);
 }
 
 }  // namespace isohf::view

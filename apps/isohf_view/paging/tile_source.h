@@ -48,6 +48,7 @@ struct Place {
   int decimals = 0;                  ///< of the elevation: as many as codes have steps
   std::optional<MapPoint> map;       ///< in the source's system, where that is a map
   std::optional<GeoPoint> geo;
+  bool is_outside = false;  ///< of what the source covers; without an elevation inside it is void
 };
 
 /// Where tiles come from. All functions may be called from any number of threads at once.
@@ -110,7 +111,9 @@ class TileSource {
 /// Opens an archive for viewing. 16- and 8-bit codes are taken as they are; float elevations are rounded to 65535
 /// steps between the dataset's smallest and largest elevation. Throws what ArchiveReader throws.
 /// second  an archive whose surface this one is compared with; or none
-[[nodiscard]] std::unique_ptr<TileSource> open_archive(const std::string& path, const std::string& second = "");
+/// name    what messages call it; empty: its path
+[[nodiscard]] std::unique_ptr<TileSource> open_archive(const std::string& path, const std::string& second = "",
+                                                       const std::string& name = "");
 
 /// Tile columns and rows first..last, inclusive; empty where last < first.
 struct TileRange {

@@ -42,7 +42,7 @@ std::vector<std::string> wrapped(const std::vector<std::string>& lines, std::siz
 }
 
 std::string number(double value) {
-  return fmt::format("{:.6g}", value + 0.0);
+  return std::abs(value) < 1e9 ? fmt::format("{:.10g}", value + 0.0) : fmt::format("{:.6g}", value);
 }
 
 }  // namespace
@@ -82,10 +82,8 @@ void Hud::draw(const Reading& reading, int width, int height, double scale) {
   const float edge = 4.0F * overlay_.size();
   draw_way(reading.way);
   if (!reading.colours.empty()) draw_legend(reading, w, h);
-  if (reading.world_per_px > 0.0) {
-    draw_scale(reading, h);
-    draw_north(reading.heading_rad, w, h);
-  }
+  if (reading.world_per_px > 0.0) draw_scale(reading, h);
+  if (reading.heading_rad) draw_north(*reading.heading_rad, w, h);
   if (reading.profile) draw_profile(*reading.profile, reading, w, h);
   if (reading.hours) draw_slider(*reading.hours, width, height, scale);
   const std::vector<std::string>& lines = reading.help.empty() ? reading.figures : reading.help;

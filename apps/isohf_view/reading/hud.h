@@ -23,11 +23,11 @@ struct Reading {
   std::vector<ColourStop> colours;   ///< of the legend, by elevation; none: no legend
   double low = 0.0;                  ///< the legend's range
   double high = 0.0;
-  std::string height_unit;    ///< "metre"; empty where it is not known
-  std::string ground_unit;    ///< of world units
-  double world_per_px = 0.0;  ///< at the middle of the picture; 0: no scale bar
-  double heading_rad = 0.0;
-  std::optional<double> hours;  ///< of the day, on the slider
+  std::string height_unit;            ///< "metre"; empty where it is not known
+  std::string ground_unit;            ///< of world units
+  double world_per_px = 0.0;          ///< at the middle of the picture; 0: no scale bar
+  std::optional<double> heading_rad;  ///< nullopt: no North arrow
+  std::optional<double> hours;        ///< of the day, on the slider
   std::optional<Profile> profile;
   std::vector<std::optional<PicturePoint>> way;  ///< what is measured, in the picture; nullopt behind the eye
 };

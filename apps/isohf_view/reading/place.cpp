@@ -36,6 +36,7 @@ std::vector<std::string> lines_of(const Place& place) {
     lines.back() +=
         fmt::format("  elevation {:.{}f}{}", rounded(*place.elevation, place.decimals), place.decimals, unit);
   }
+  if (!place.elevation) lines.back() += place.is_outside ? "  outside" : "  void";
   if (place.difference) {
     const int decimals = place.decimals + 1;
     lines.push_back(fmt::format("the second lies {:+.{}f}{}", rounded(*place.difference, decimals), decimals, unit));
@@ -58,11 +59,15 @@ ordered_json json_of(const Place& place) {
   if (place.map) json["map"] = {place.map->easting, place.map->northing};
   if (place.geo) json["longitude"] = place.geo->longitude;
   if (place.geo) json["latitude"] = place.geo->latitude;
+  json["state"] = place.elevation ? "ground" : place.is_outside ? "outside" : "void";
   return json;
 }
 
 Place probe(const TileSource& source, Ground& ground, WorldPoint at) {
-  return source.describe(at, ground.height(at, source.covered()));
+  const WorldBounds covered = source.covered();
+  Place place = source.describe(at, ground.height(at, covered));
+  place.is_outside = at.x < covered.x0 || at.x > covered.x1 || at.z < covered.z0 || at.z > covered.z1;
+  return place;
 }
 
 double distance_between(const TileSource& source, WorldPoint from, WorldPoint to) {

@@ -40,6 +40,9 @@ struct ColourStop {
   std::uint8_t blue = 0;
 };
 
+/// Whether air reddens the sun's light and scatters some: on Earth, Venus, Mars and Titan, and where the body is not known.
+[[nodiscard]] bool has_air(const Metadata& metadata);
+
 /// The palette's colours over the archive's range, by rising elevation; at one elevation there may be two. nullopt: the
 /// palette of its body, grey where that is neither Earth nor Mars.
 [[nodiscard]] std::vector<ColourStop> shade_colours(const Metadata& metadata, std::optional<ShadePalette> palette = {});

@@ -45,6 +45,11 @@ bool is_on(const Metadata& metadata, const char* body) {
 
 }  // namespace
 
+bool has_air(const Metadata& metadata) {
+  return metadata.source.body.empty() || is_on(metadata, "Earth") || is_on(metadata, "Venus") ||
+         is_on(metadata, "Mars") || is_on(metadata, "Titan");
+}
+
 std::vector<ColourStop> shade_colours(const Metadata& metadata, std::optional<ShadePalette> palette) {
   require_known("the palette", palette.value_or(ShadePalette::kElevation), ShadePalette::kMars);
   const double low = metadata.statistics.min.value_or(0.0);
@@ -96,7 +101,7 @@ Light Palette::at(double elevation) const {
   return {blend(low.red, high.red), blend(low.green, high.green), blend(low.blue, high.blue)};
 }
 
-Illumination::Illumination(double sun_azimuth_deg, double sun_elevation_deg, bool relief)
+Illumination::Illumination(double sun_azimuth_deg, double sun_elevation_deg, bool relief, bool air)
     : relief_(relief), towards_(towards_sun(sun_azimuth_deg, sun_elevation_deg)) {
   // A real sun near the horizon leaves flat ground dark. The exposure follows it, though not all the way, so that a
   // morning stays a morning: flat ground gets sin^0.35 of what a high sun gives it.
@@ -105,9 +110,10 @@ Illumination::Illumination(double sun_azimuth_deg, double sun_elevation_deg, boo
   const double warmth = std::exp(-sun_elevation_deg / 12.0);
   const double colour[3] = {1.0, 0.965 - 0.26 * warmth, 0.90 - 0.52 * warmth};
   constexpr double kSky[3] = {0.19, 0.25, 0.36};
+  constexpr double kGroundAround = 0.22;  // what lights shadows where no sky does
   for (std::size_t k = 0; k < 3; ++k) {
-    sun_[k] = static_cast<float>(exposure * colour[k]);
-    sky_[k] = static_cast<float>(kSky[k]);
+    sun_[k] = static_cast<float>(exposure * (air ? colour[k] : 0.95));
+    sky_[k] = static_cast<float>(air ? kSky[k] : kGroundAround);
   }
 }
 

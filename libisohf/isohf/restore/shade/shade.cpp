@@ -326,7 +326,7 @@ class ShadeRenderer {
         grid_(archive.metadata().plane_grid(plane_)),
         columns_(grid_, x_),
         palette_(request.colours.empty() ? shade_colours(archive.metadata(), request.palette) : request.colours),
-        illumination_(request.sun_azimuth_deg, request.sun_elevation_deg, request.relief),
+        illumination_(request.sun_azimuth_deg, request.sun_elevation_deg, request.relief, has_air(archive.metadata())),
         sun_(towards_sun(request.sun_azimuth_deg, request.sun_elevation_deg)),
         datum_(archive.metadata().statistics.min.value_or(0.0)),
         ground_(ground_scale(archive.metadata())),
