@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "isohf/convert.h"
 #include "isohf/error.h"
+#include "isohf/restore/shade/light.h"
 #include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
@@ -77,6 +79,20 @@ TEST(ShadeColours, ColourTheSeaOfTheEarthAloneAlsoWhereNothingLiesDeeper) {
     metadata.statistics.min = -40.0;
     metadata.source.body = "";
     EXPECT_FALSE(is_blue(-40.0));
+  }
+}
+
+TEST(Illumination, HasNoColourWhereThereIsNoAir) {
+  Metadata metadata(TileGrid::make(TileShape::make(12, 11, 3), 1, 1, 1.0, 1.0));
+  for (const auto& [body, air] :
+       {std::pair{"", true}, {"Earth", true}, {"Mars", true}, {"Moon", false}, {"Ceres", false}}) {
+    metadata.source.body = body;
+    EXPECT_EQ(has_air(metadata), air) << body;
+    const Illumination low(90.0, 5.0, true, has_air(metadata));
+    const Light lit = low.on({0.0F, 1.0F, 0.0F}, 1.0F);
+    const Light dark = low.on({0.0F, 1.0F, 0.0F}, 0.0F);
+    EXPECT_EQ(lit[0] > lit[2], air) << body;
+    EXPECT_EQ(dark[0] < dark[2], air) << body;
   }
 }
 

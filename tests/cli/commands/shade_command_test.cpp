@@ -284,8 +284,7 @@ TEST_F(ShadeCommand, PalettesSuitTheBody) {
     return read_channel(folder / "b.tif", "0").at(15, 5) - read_channel(folder / "b.tif", "2").at(15, 5);
   };
   EXPECT_GT(hue(3396190, {}), hue(1737400, {}) + 30) << "red over blue";
-  EXPECT_EQ(hue(1737400, {}), 0) << "no air colours its light";
-  EXPECT_NE(hue(3396190, {"--palette", "gray"}), 0);
+  EXPECT_EQ(hue(3396190, {"--palette", "gray"}), hue(1737400, {}));
 }
 
 TEST_F(ShadeCommand, BytesDoNotDependOnThreads) {
