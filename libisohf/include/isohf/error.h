@@ -77,7 +77,12 @@ struct Warning : std::string {
     kUndeclaredNodata,  ///< a note that samples hold what looks like nodata
   };
 
-  Warning(std::string text, Kind its_kind = Kind::kNote) : std::string(std::move(text)), kind(its_kind) {}
+  /// One line: texts that come from a file have blanks in place of control characters.
+  Warning(std::string text, Kind its_kind = Kind::kNote) : std::string(std::move(text)), kind(its_kind) {
+    for (char& c : *this) {
+      if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = ' ';
+    }
+  }
   Warning(const char* text) : Warning(std::string(text)) {}
 
   /// The same kind of news in other words.
