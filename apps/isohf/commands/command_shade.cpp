@@ -237,6 +237,22 @@ std::vector<Frame> frames_of(const ShadeCommand& options, ArchiveReader& archive
                                                        std::max(0.0, -sun.elevation_deg)));
 }
 
+/// Heights without a unit, as fractions are, may be too small beside the ground for a slope to be seen.
+void tell_flat_relief(const Metadata& metadata, const ShadeOptions& request) {
+  constexpr double kFlat = 0.01;
+  constexpr double kHilly = 0.2;
+  const bool is_seen = request.relief && request.kind <= ShadeKind::kMultidirectional;
+  const WorldBounds& ground = metadata.valid;
+  const double range = metadata.statistics.max.value_or(0.0) - metadata.statistics.min.value_or(0.0);
+  const double share = range / std::min(ground.x1 - ground.x0, ground.z1 - ground.z0);
+  const bool is_to_scale = metadata.horizontal_unit != "unknown";
+  if (!is_seen || is_to_scale || request.exaggeration != 1.0 || !(share > 0.0) || share > kFlat) return;
+  print_note(
+      fmt::format("elevations span {:.2g} of the ground's width in numbers without a unit, so that no slope is seen; "
+                  "--exaggeration {:.0f} shows them",
+                  share, std::pow(10.0, std::round(std::log10(kHilly / share)))));
+}
+
 int run(ShadeCommand options) {
   const auto start = std::chrono::steady_clock::now();
   const CommonOptions& common = options.common;
@@ -252,6 +268,7 @@ int run(ShadeCommand options) {
                     options.archive, ground->mean_scale));
   }
   ShadeOptions& request = options.picture;
+  if (!common.quiet) tell_flat_relief(metadata, request);
   const GridSize size = request.size.value_or(shade_size(archive, options.longest));
   request.size = size;
   if (!options.palette.empty()) request.colours = read_colour_relief(options.palette, archive.metadata());

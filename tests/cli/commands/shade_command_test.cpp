@@ -287,6 +287,27 @@ TEST_F(ShadeCommand, PalettesSuitTheBody) {
   EXPECT_EQ(hue(3396190, {"--palette", "gray"}), hue(1737400, {}));
 }
 
+TEST_F(ShadeCommand, TellsOfReliefThatCannotBeSeen) {
+  std::vector<float> heights(400);
+  for (std::size_t i = 0; i < heights.size(); ++i) heights[i] = static_cast<float>(i % 7) / 200.0F;
+  RasterSpec spec;
+  spec.width = spec.height = 20;
+  write_raster(folder / "fractions.exr", spec, std::as_bytes(std::span(heights)));
+  ASSERT_EQ(run_isohf({"convert", folder / "fractions.exr", folder / "f.isohf", "-q"}).exit_code, 0);
+  const auto said = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> shade = {"shade", folder / "f.isohf", folder / "f.png", "--overwrite"};
+    shade.insert(shade.end(), more.begin(), more.end());
+    const RunResult result = run_isohf(shade);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.err;
+  };
+  EXPECT_NE(said({}).find("--exaggeration 100 shows them"), std::string::npos) << said({});
+  EXPECT_NE(said({"--hillshade"}).find("--exaggeration 100 shows them"), std::string::npos);
+  EXPECT_EQ(said({"--exaggeration", "100"}), "");
+  EXPECT_EQ(said({"--shadow-mask"}), "");
+  EXPECT_EQ(said({"-q"}), "");
+}
+
 TEST_F(ShadeCommand, BytesDoNotDependOnThreads) {
   const std::vector<std::string> options = {"--azimuth", "160", "--size", "77x33", "-j"};
   std::string first;
