@@ -8,10 +8,12 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <iostream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "isohf/archive.h"
 #include "isohf/error.h"
 #include "isohf/verify.h"
 #include "support/altered_archive.h"
@@ -275,12 +277,25 @@ TEST(AlteredArchives, EveryFlippedBitIsFound) {
   }
 }
 
-/// ISOHF_FLIPS=N tries every N-th bit of each archive that is kept, ISOHF_FLIPS_OF=NAME of one.
+/// What all members hold, one behind the other.
+std::vector<std::byte> contents_of(const std::string& path) {
+  const ArchiveReader archive(path);
+  std::vector<std::byte> all;
+  for (const auto& member : archive.members()) {
+    const std::vector<std::byte> content = archive.read_member(member);
+    all.insert(all.end(), content.begin(), content.end());
+  }
+  return all;
+}
+
+/// ISOHF_FLIPS=N tries every N-th bit of each archive that is kept, ISOHF_FLIPS_OF=NAME of one. In version 1, which has no
+/// checksum of members as they stand, Deflate may say the same with another bit.
 TEST(AlteredArchives, EveryFlippedBitOfThoseThatAreKeptIsFound) {
   const TemporaryFolder folder;
   const char* const step = std::getenv("ISOHF_FLIPS");
   const char* const only = std::getenv("ISOHF_FLIPS_OF");
   std::size_t flips = 0;
+  int same = 0;
   for (const char* kept : {"/testdata/archives/v1", "/testdata/conformance/good"}) {
     for (const auto& entry : std::filesystem::directory_iterator(ISOHF_SOURCE_DIR + std::string(kept))) {
       if (only != nullptr && entry.path().stem() != only) continue;
@@ -291,14 +306,19 @@ TEST(AlteredArchives, EveryFlippedBitOfThoseThatAreKeptIsFound) {
         const auto flip = [&] { bytes[bit / 8] = static_cast<char>(bytes[bit / 8] ^ (1 << (bit % 8))); };
         flip();
         write_file(folder / "a.isohf", bytes);
-        EXPECT_THAT(findings_in(folder / "a.isohf"), testing::Not(testing::IsEmpty()))
-            << entry.path() << " bit " << bit;
+        if (findings_in(folder / "a.isohf").empty()) {
+          const bool says_the_same =
+              std::string(kept).ends_with("/v1") && contents_of(folder / "a.isohf") == contents_of(entry.path());
+          EXPECT_TRUE(says_the_same) << entry.path() << " bit " << bit;
+          same += says_the_same ? 1 : 0;
+        }
         flip();
       }
     }
   }
   EXPECT_GT(flips, 0U);
   RecordProperty("flips", static_cast<int>(flips));
+  std::cout << flips << " flips, " << same << " of which change nothing that is read\n";
 }
 
 TEST(AlteredArchives, NoProgramCrashesOnThem) {
