@@ -49,9 +49,7 @@ int take_screenshot(const TileSource& source, const Options& options) {
         fmt::format("--memory {}M holds the tiles within {:.0f} world units of the eye; what lies beyond is left out",
                     options.memory_mib, session.boxes().figures().radius));
   }
-  target.bind_joined();
-  if (options.legend) session.draw_legend();
-  write_picture(options.screenshot, target.width(), target.height(), options.overwrite);
+  session.keep(target, options, options.screenshot);
   print_result(options.common, "", [&] {
     return ordered_json{{"archive", options.archives[0]}, {"screenshot", options.screenshot},
                         {"driver", driver_name()},        {"width", target.width()},

@@ -31,7 +31,7 @@ TileBoxLimits limits_from(const TileSource& source, const Options& options) {
   TileBoxLimits limits;
   limits.memory_bytes = (options.memory_mib << 20) - texture_bytes(source, options);
   limits.upload_bytes_per_frame = options.upload_mib << 20;
-  const std::uint64_t boxes = source.planes() == nullptr ? 1 : static_cast<std::uint64_t>(source.planes()->count()) + 1;
+  const std::uint64_t boxes = static_cast<std::uint64_t>(planes_of(source).count()) + 1;
   const std::uint64_t least = kTilesAtLeast * boxes * TileBox::most_bytes_of_a_tile(source);
   limits.enough_mib = options.archives.size() * (source.textures() == nullptr ? 1 : 3) * ((least >> 20U) + 1);
   const int cores = static_cast<int>(std::thread::hardware_concurrency());
@@ -349,6 +349,12 @@ void Session::draw_overlay(const Shown& shown) {
   reading.profile = shown.profile;
   for (const Vec3 at : shown.way) reading.way.push_back(project(camera, view, at));
   hud_.draw(reading, view.width, view.height, shown.screen_scale);
+}
+
+void Session::keep(const Offscreen& picture, const Options& options, const std::string& path) {
+  picture.bind_joined();
+  if (options.legend) draw_legend();
+  write_picture(path, picture.width(), picture.height(), options.overwrite);
 }
 
 void Session::draw_legend() {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "camera.h"
+#include "gl/offscreen.h"
 #include "options.h"
 #include "paging/plane_boxes.h"
 #include "paging/texture_box.h"
@@ -47,8 +48,8 @@ class Session {
     double screen_scale = 1.0;
   };
   void draw_overlay(const Shown& shown);
-  /// The same for a picture without a hand: the legend alone.
-  void draw_legend();
+  /// Writes a picture that was drawn, with the legend alone where it is wanted.
+  void keep(const Offscreen& picture, const Options& options, const std::string& path);
   /// The distance from the eye as long as it is on the body.
   [[nodiscard]] double true_distance(Vec3 at) const;
 
@@ -91,6 +92,7 @@ class Session {
 
  private:
   void prepare();
+  void draw_legend();
   void draw();
   void choose_colours();
   [[nodiscard]] Camera first_camera(Vec3& target) const;

@@ -406,9 +406,7 @@ void fly(const TileSource& source, const Options& options, const std::function<v
           (name.parent_path() / fmt::format("{}-{:04}.png", name.stem().string(), frame + 1)).string();
       cli::check_output_file({options.archives[0]}, numbered, options.overwrite);
       check_raster_target(numbered, options.overwrite);
-      target.bind_joined();
-      if (options.legend) session.draw_legend();
-      write_picture(numbered, target.width(), target.height(), options.overwrite);
+      session.keep(target, options, numbered);
     }
     const FrameFigures& figures = session.figures();
     const TileBoxFigures& box = session.boxes().figures();
