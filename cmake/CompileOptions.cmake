@@ -34,7 +34,7 @@ if(ISOHF_SANITIZE)
   endif()
 endif()
 if(ISOHF_TSAN)
-  # Where oneTBB is instrumented as well (scripts/tsan): fences, which ThreadSanitizer does not follow, stand in its headers alone.
+  # Where oneTBB is instrumented as well (scripts/dev/tsan): fences, which ThreadSanitizer does not follow, stand in its headers alone.
   target_compile_options(isohf_options INTERFACE -fsanitize=thread -fno-omit-frame-pointer $<$<CXX_COMPILER_ID:GNU>:-Wno-tsan>)
   target_link_options(isohf_options INTERFACE -fsanitize=thread)
 endif()

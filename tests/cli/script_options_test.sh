@@ -10,9 +10,9 @@ expect() {  # expect CODE SCRIPT ARGUMENT...
   found=$?
   ((found == code)) || { echo "$*: ended with $found, must be $code"; failed=1; }
 }
-for script in accuracy_table bench check faults flight fuzz make_testdata quickstart setup test; do
-  expect 0 "scripts/$script" --help
-  [[ $script == test ]] || expect 2 "scripts/$script" --nonsense
+for script in scripts/{accuracy_table,bench,check,flight,quickstart,setup,test} scripts/dev/{faults,fuzz,soak,tsan} testdata/make_testdata; do
+  expect 0 "$script" --help
+  [[ $script == scripts/test ]] || expect 2 "$script" --nonsense
 done
 expect 2 scripts/accuracy_table --data
 expect 2 scripts/accuracy_table --quick
@@ -21,7 +21,7 @@ expect 2 scripts/bench --rounds 0
 expect 2 scripts/check --fix --nonsense
 expect 2 scripts/flight --frames
 expect 2 scripts/flight --frames none
-expect 2 scripts/fuzz archive soon
+expect 2 scripts/dev/fuzz archive soon
 expect 0 scripts/slurm/submit --help
 expect 2 scripts/slurm/submit a.plan
 expect 0 scripts/slurm/try --help

@@ -166,7 +166,7 @@ def main(isohf, page, write):
         data = (pathlib.Path(folder) / "tiny.isohf").read_bytes()
     kept = pathlib.Path(page).parent.parent / "testdata" / "conformance" / "good" / "tiny.isohf"
     if data != kept.read_bytes():
-        sys.exit(f"{kept} is another archive than the example's; scripts/make_conformance makes it anew")
+        sys.exit(f"{kept} is another archive than the example's; testdata/make_conformance makes it anew")
     made = describe(data)
     text = pathlib.Path(page).read_text()
     head, found = text.split(HEADING) if HEADING in text else (text + "\n", "")

@@ -1,7 +1,7 @@
 /// System calls that fail, one by one: nothing is left half-written, nothing that was complete is lost, and what could
 /// not be done is said in one line with the file's name and the cause.
 ///
-/// ISOHF_FAULTS=all tries every call with every error and a thousand allocations of each command (scripts/faults);
+/// ISOHF_FAULTS=all tries every call with every error and a thousand allocations of each command (scripts/dev/faults);
 /// otherwise those that differ most.
 
 #include <gmock/gmock.h>
@@ -223,7 +223,7 @@ TEST_P(Faults, ACallThatFailsLeavesAllOrNothing) {
 
 TEST_P(Faults, MemoryThatRunsOutEndsInOneLine) {
   // Where memory ran out as it set up its threads, oneTBB 2021.8 may wait for them for ever.
-  if (!tries_all()) GTEST_SKIP() << "scripts/faults does this";
+  if (!tries_all()) GTEST_SKIP() << "scripts/dev/faults does this";
   // PROJ tells no lack of memory from a system that it does not know; the archive then lacks its WKT.
   if (job().name == "convert_asc") GTEST_SKIP() << "the .prj is read by PROJ";
   const long count = learn()["malloc"];

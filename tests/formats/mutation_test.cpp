@@ -46,7 +46,7 @@ std::filesystem::path fast_parent() {
 }
 
 // ISOHF_READER_CASES=FOLDER writes every case to FOLDER/NAME, beside .opened, which names what is opened: for
-// scripts/portability.
+// scripts/dev/portability.
 TEST(ReaderCases, AreWrittenWhereScriptsWantThem) {
   const char* const folder = std::getenv("ISOHF_READER_CASES");
   if (folder == nullptr) GTEST_SKIP() << "ISOHF_READER_CASES names no folder";
@@ -166,7 +166,7 @@ TEST_P(ReaderMutation, RefusesOrReadsEveryTruncation) {
 TEST_P(ReaderMutation, SurvivesDamagedFiles) {
   const ReaderCase& each = tested();
   const auto found = std::filesystem::path(ISOHF_SOURCE_DIR) / "tests/fuzz/corpus/reader" / each.name;
-  if (std::filesystem::is_directory(found)) {  // by scripts/fuzz
+  if (std::filesystem::is_directory(found)) {  // by scripts/dev/fuzz
     for (const auto& entry : std::filesystem::directory_iterator(found)) {
       SCOPED_TRACE(entry.path().string());
       (void)outcome(read_file(entry.path()));

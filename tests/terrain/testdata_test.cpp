@@ -34,7 +34,7 @@ TEST(Testdata, IsWhatMakeTestdataMakesSampleForSample) {
   const fs::path kept = ISOHF_SOURCE_DIR "/testdata";
   const test::TemporaryFolder made;
   const std::string command = "MAKE_TERRAIN='" ISOHF_BIN_DIR "/make_terrain' '" ISOHF_SOURCE_DIR
-                              "/scripts/make_testdata' '" +
+                              "/testdata/make_testdata' '" +
                               made.path() + "' >/dev/null";
   ASSERT_EQ(std::system(command.c_str()), 0);
   const auto names = rasters_in(kept);

@@ -19,7 +19,7 @@ struct Loaded {
   TileCodes codes;
 };
 
-/// For ThreadSanitizer above all (scripts/tsan): workers read one archive while their owner asks and collects.
+/// For ThreadSanitizer above all (scripts/dev/tsan): workers read one archive while their owner asks and collects.
 TEST(BackgroundLoader, GivesEachTileOnceAsTheArchiveHasIt) {
   const test::TemporaryFolder folder;
   test::MemorySource<std::int16_t> source(SampleType::kInt16, 300, 200, [](std::int64_t c, std::int64_t r) {
