@@ -6,7 +6,7 @@ slurm_or_skip() {
   ((EUID == 0)) || why="slurmd starts jobs as root alone"
   local program
   for program in munged slurmctld slurmd sbatch; do
-    command -v "$program" >/dev/null || why="$program is not here; scripts/setup --cluster installs it"
+    command -v "$program" >/dev/null || why="$program is not here; .ci/cluster installs it"
   done
   [[ -z $why ]] || { echo "${0##*/}: SKIPPED: $why"; exit 0; }
 }

@@ -10,7 +10,7 @@ expect() {  # expect CODE SCRIPT ARGUMENT...
   found=$?
   ((found == code)) || { echo "$*: ended with $found, must be $code"; failed=1; }
 }
-for script in scripts/{accuracy_table,bench,check,flight,quickstart,setup,test} scripts/dev/{faults,fuzz,soak,tsan} testdata/make_testdata; do
+for script in scripts/{accuracy_table,bench,check,flight,quickstart,test} scripts/dev/{faults,fuzz,soak,tsan} testdata/make_testdata; do
   expect 0 "$script" --help
   [[ $script == scripts/test ]] || expect 2 "$script" --nonsense
 done
@@ -28,6 +28,6 @@ expect 0 scripts/slurm/try --help
 expect 2 scripts/slurm/try --nonsense
 expect 0 scripts/slurm/kills --help
 expect 2 scripts/slurm/kills many
-expect 2 scripts/setup --all --nonsense
+expect 2 scripts/quickstart --packages --nonsense
 expect 2 scripts/test --golden nonsense
 exit $failed
