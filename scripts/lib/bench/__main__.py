@@ -1,7 +1,7 @@
 """Called by scripts/bench: ROOT [SECTION...] [options].
 
-A section is a file of sections/: its first line says what it measures, measure(bench) does so and calls bench.add(); docs/performance.md has a place for its table. Where it cannot
-be quick on small inputs it says SMOKE = False.
+A section is a file of sections/: its first line says what it measures, measure(bench) does so and calls bench.add(). docs/performance.md has a
+place for its table.
 """
 
 import argparse
@@ -12,7 +12,7 @@ import sys
 
 from harness import Bench
 
-FIRST = ["convert", "peers", "floor", "filters", "sizes", "large", "memory"]
+FIRST = ["convert", "peers", "sizes", "large", "memory"]
 
 
 def section_names():
@@ -33,7 +33,6 @@ def parse(arguments):
     parser.add_argument("root")
     parser.add_argument("sections", nargs="*", metavar="SECTION")
     parser.add_argument("--rounds", type=int, default=None)
-    parser.add_argument("--small", action="store_true")
     parser.add_argument("--smoke", action="store_true")
     parser.add_argument("--write", action="store_true")
     parser.add_argument("--json", action="store_true")
@@ -43,10 +42,8 @@ def parse(arguments):
     for section in options.sections:
         if section not in section_names():
             parser.error(f"{section}: no section; there are {', '.join(section_names())}")
-    if options.smoke:
-        options.small, options.rounds = True, 1
     if options.rounds is None:
-        options.rounds = 2 if options.small else 5
+        options.rounds = 1 if options.smoke else 5
     if options.rounds < 1:
         parser.error("--rounds: at least 1")
     return options
@@ -62,9 +59,7 @@ def main():
             print(f"    {name + ':':<10} {module.__doc__.strip().splitlines()[0]}")
         return
     options = parse(sys.argv[1:])
-    chosen = options.sections or ["convert"]
-    if options.smoke and not options.sections:
-        chosen = [name for name in sections if getattr(sections[name], "SMOKE", True)]
+    chosen = options.sections or (list(sections) if options.smoke else ["convert"])
     bench = Bench(options)
     if options.write:
         bench.has_places(chosen)

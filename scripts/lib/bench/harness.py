@@ -59,13 +59,6 @@ class Bench:
         return {"wall_s": wall, "cpu_s": float(user) + float(system), "peak_mb": float(peak) / 1024,
                 "out": result.stdout.decode(errors="replace")}
 
-    def run_plainly(self, *command):
-        """Standard output alone; several may run at once."""
-        result = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False)
-        if result.returncode != 0:
-            self.fail(f"{' '.join(map(str, command))}: {result.stderr.strip()}")
-        return result.stdout
-
     def cores(self):
         return len(os.sched_getaffinity(0))
 
@@ -99,7 +92,7 @@ class Bench:
 
     def input(self):
         return self.warm(pathlib.Path(self.options.input) if self.options.input else self.terrain(
-            "2048x1024" if self.options.small else "16384x8192"))
+            "2048x1024" if self.options.smoke else "16384x8192"))
 
     @staticmethod
     def warm(path):
@@ -112,9 +105,6 @@ class Bench:
 
     def info(self, archive):
         return json.loads(self.run(self.isohf, "info", archive, "--json")["out"])
-
-    def info_plainly(self, archive):
-        return json.loads(self.run_plainly(self.isohf, "info", archive, "--json"))
 
     def add(self, section, header, rows, note):
         lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]

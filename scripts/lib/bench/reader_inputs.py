@@ -48,7 +48,7 @@ class Maker:
 
     def __init__(self, bench: Bench):
         self.bench = bench
-        small = bench.options.small
+        small = bench.options.smoke
         # 64 MiB of samples where the format lets us, and of whole degrees the largest tile there is; texts are some
         # tens of MB, as GDAL takes its time for them.
         self.integers = (1201, 1201) if small else (8192, 4096)
@@ -141,7 +141,7 @@ class Maker:
 
     def tiles(self):
         """Tiles of a web map of as many samples as its zoom level has each way, of the North: one band as three."""
-        side = 1024 if self.bench.options.small else 8192
+        side = 1024 if self.bench.options.smoke else 8192
         edge = 20037508.342789244
         self.add("MBTiles", "land.mbtiles", self.integers, "-of", "MBTiles", "-ot", "Byte", "-scale", *("-b", "1") * 3,
                  "-srcwin", 0, 0, side, side // 2, "-a_srs", "EPSG:3857", "-a_ullr", -edge, edge, edge, 0, "-co", "TILE_FORMAT=PNG")

@@ -26,7 +26,7 @@ def cost_of_inflating(found):
 def measure(bench):
     source = bench.input()
     # As many samples as the lattice has, on a raster that shares none with the input: GDAL has to interpolate.
-    size = ["1907", "1099"] if bench.options.small else ["15247", "8803"]
+    size = ["1907", "1099"] if bench.options.smoke else ["15247", "8803"]
     rounds = bench.options.rounds
     archive, step1 = bench.work / "iso.isohf", bench.work / "iso1.isohf"
     translated, warped = bench.work / "translate.tif", bench.work / "warp.tif"

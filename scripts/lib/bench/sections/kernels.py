@@ -9,7 +9,7 @@ def measure(bench):
     program = bench.root / "build/bench/kernels_bench"
     command = [program, "--benchmark_format=json", f"--benchmark_repetitions={bench.options.rounds}",
                "--benchmark_enable_random_interleaving=true"]
-    if bench.options.small:
+    if bench.options.smoke:
         command.append("--benchmark_min_time=0.01")
     found, labels = {}, {}
     # They run at random; the table has them in the program's order.

@@ -15,7 +15,7 @@ def bytes_read(command):
 
 
 def measure(bench):
-    sizes = ["2048x1024", "8192x4096"] if bench.options.small else ["16384x8192", "65536x32768"]
+    sizes = ["2048x1024", "8192x4096"] if bench.options.smoke else ["16384x8192", "65536x32768"]
     found, rows = {}, []
     for size in sizes:
         source, archive = bench.warm(bench.terrain(size)), bench.work / "large.isohf"

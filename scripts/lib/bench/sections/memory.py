@@ -56,7 +56,7 @@ def places(bench, size):
     """A file of places over the ground."""
     path = bench.work / "memory_places.bin"
     width, height = (int(side) for side in size.split("x"))
-    count = 10000 if bench.options.small else 1000000
+    count = 10000 if bench.options.smoke else 1000000
     with open(path, "wb") as file:
         for i in range(count):
             file.write(struct.pack("<2d", i * 0.618033988749895 % 1.0 * width, i * 0.754877666246693 % 1.0 * height))
@@ -137,7 +137,7 @@ def measure_size(bench, size, limit, found, rows):
 
 def measure(bench):
     # Memory follows the width: two shapes of as many samples, and what each is held to.
-    sizes = {"16384x1024": 36} if bench.options.small else {"1000000x300": 268, "100000x3000": 64}
+    sizes = {"16384x1024": 36} if bench.options.smoke else {"1000000x300": 268, "100000x3000": 64}
     found, rows = {}, []
     try:
         for size, limit in sizes.items():

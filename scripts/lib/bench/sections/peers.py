@@ -10,10 +10,10 @@ def creation(options):
 
 def measure(bench):
     # Half the width and height of the other sections: JPEG XL and JPEG 2000 take their time.
-    full = "1024x512" if bench.options.small else "8192x4096"
-    size = ["953", "549"] if bench.options.small else ["7623", "4402"]
+    full = "1024x512" if bench.options.smoke else "8192x4096"
+    size = ["953", "549"] if bench.options.smoke else ["7623", "4402"]
     source = bench.terrain(full)
-    rounds = 1 if bench.options.small else min(bench.options.rounds, 3)
+    rounds = 1 if bench.options.smoke else min(bench.options.rounds, 3)
     archive = bench.work / "peers.isohf"
     jobs = {"isohf convert --step 1": [*bench.convert, source, "-o", archive, "--overwrite", "--quiet", "--step",
                                        "1"]}
@@ -41,7 +41,7 @@ def measure(bench):
     bench.run("gdal_translate", "-q", "-r", "bilinear", "-outsize", *size, "-of", "PNM", "-ot", "UInt16", source, pgm)
     if bench.has("peers", "cjxl", "libjxl-tools"):
         path = bench.work / "peers.jxl"
-        effort = "3" if bench.options.small else "7"
+        effort = "3" if bench.options.smoke else "7"
         add(f"cjxl -d 0 -e {effort}", path, ["cjxl", pgm, path, "-d", "0", "-e", effort, "--num_threads=2", "--quiet"])
     if bench.has("peers", "opj_compress", "libopenjp2-tools"):
         path = bench.work / "peers.jp2"

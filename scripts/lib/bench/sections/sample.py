@@ -5,8 +5,8 @@ import struct
 
 
 def measure(bench):
-    side = 1000 if bench.options.small else 6000
-    counts = [2000, 20000] if bench.options.small else [200000, 5000000]
+    side = 1000 if bench.options.smoke else 6000
+    counts = [2000, 20000] if bench.options.smoke else [200000, 5000000]
     source = bench.warm(bench.terrain(f"{side}x{side}"))
     archive = bench.work / "sample.isohf"
     bench.run(bench.isohf, "convert", source, "-o", archive, "--overwrite", "--quiet")

@@ -11,7 +11,7 @@ DEMS = ["srtm_bigtujunga30m_utm11.tif", "N44E006.hgt", "N44E007.hgt", "N41E002.h
 def measure(bench):
     folder = pathlib.Path(bench.options.data)
     dems = [folder / name for name in DEMS if (folder / name).exists()]
-    if bench.options.small:
+    if bench.options.smoke:
         dems = dems[:1]
     if not dems:
         bench.say(f"sizes: skipped: {folder} has none of the DEMs")
