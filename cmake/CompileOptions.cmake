@@ -51,7 +51,7 @@ endif()
 # isohf_compile(TARGET HEADER...): parses what most sources of the product include once for the target, and compiles the
 # sources of each folder together: most of a compilation is templates that the next one makes again. A build with ccache
 # (scripts/lib/build.sh) and the preset lean compile each source by itself, so that it includes what it uses and keeps all
-# warnings; scripts/check finds names that two sources of a folder have for themselves.
+# warnings. Two sources of a folder cannot have private names in common: that build fails.
 function(isohf_compile target)
   target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:isohf_precompiled>)
   # What a program says of a broken invariant names the source in this tree, not a folder of the machine that built it.
