@@ -308,18 +308,6 @@ TEST_F(Convert, EveryFilterStaysInsideItsCodes) {
   }
 }
 
-TEST_F(Convert, ElevationsOutsideTheZRangeAreRefusedOrCounted) {
-  auto source = hills();
-  ConvertOptions options = small_tiles();
-  options.z_range = {600.0, 900.0};
-  EXPECT_THROW((void)run(source, path("range.isohf"), options), Error);
-  EXPECT_FALSE(fs::exists(path("range.isohf")));
-  EXPECT_FALSE(fs::exists(path("range.isohf.part")));
-  options.clamp_range = true;
-  const ConvertSummary summary = run(source, path("range.isohf"), options);
-  EXPECT_GT(summary.metadata.statistics.clamped, 0);
-}
-
 TEST_F(Convert, NothingButVoidsIsRefusedAndLeavesNothing) {
   test::MemorySource<float> source(SampleType::kFloat32, 30, 30,
                                    [](std::int64_t, std::int64_t) { return std::numeric_limits<double>::quiet_NaN(); });
@@ -346,14 +334,6 @@ TEST_F(Convert, ACancelledJobIsResumedToTheSameBytes) {
   again.resume = true;
   (void)run(source, path("parts.isohf"), again);
   EXPECT_TRUE(test::read_file(path("parts.isohf")) == test::read_file(path("whole.isohf")));
-}
-
-TEST_F(Convert, ValuesThatLookLikeFractionsAreWarnedOf) {
-  test::MemorySource<float> source(SampleType::kFloat32, 30, 30,
-                                   [](std::int64_t c, std::int64_t) { return static_cast<double>(c) / 29.0; });
-  const ConvertSummary summary = run(source, path("unit.isohf"), small_tiles());
-  ASSERT_EQ(summary.warnings.size(), 1U);
-  EXPECT_NE(summary.warnings[0].find("`z_scale`"), std::string::npos);
 }
 
 TEST_F(Convert, RadiiOfAWholeMoonKeepTheirDecimals) {

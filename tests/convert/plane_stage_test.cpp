@@ -6,7 +6,6 @@
 #include <atomic>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <set>
@@ -35,12 +34,6 @@ class Hills : public test::MemorySource<float> {
           if (std::hypot(x - 60.0, z - 40.0) < 25.0) return std::numeric_limits<double>::quiet_NaN();
           return 300.0 + 20.0 * std::sin(x * 0.05) * std::cos(z * 0.04) + 3.0 * std::sin(x * 0.6 + z * 0.3);
         }) {}
-
-  void read_window(const Window& window, std::span<std::byte> out) override {
-    if (window.row + window.rows > fail_from_row) throw Error(ErrorCode::kCancelled, "interrupted");
-    MemorySource::read_window(window, out);
-  }
-  std::int64_t fail_from_row = std::numeric_limits<std::int64_t>::max();
 };
 
 ConvertOptions options_of(CodeType type = CodeType::kU16) {
@@ -96,40 +89,6 @@ TEST(PlaneStage, PlanesOfEveryCodeTypeHoldWhatTheTilesBelowHold) {
     }
     EXPECT_GT(same, 100);
     EXPECT_EQ(findings_in(folder / "a.isohf"), std::set<int>());
-  }
-}
-
-TEST(PlaneStage, BytesDependNeitherOnThreadsNorOnMemory) {
-  const test::TemporaryFolder folder;
-  Hills source;
-  (void)convert(source, folder / "a.isohf", options_of());
-  const std::string wanted = content(folder / "a.isohf");
-  for (const int threads : {1, 3}) {
-    Job job;
-    job.threads = threads;
-    job.memory_bytes = threads == 1 ? 20'000'000 : 0;
-    (void)convert(source, folder / "b.isohf", options_of(), job);
-    ASSERT_EQ(content(folder / "b.isohf"), wanted) << threads << " threads";
-  }
-}
-
-TEST(PlaneStage, AConversionThatIsResumedGivesTheSameBytes) {
-  const test::TemporaryFolder folder;
-  Hills source;
-  ConvertOptions options = options_of();
-  (void)convert(source, folder / "a.isohf", options);
-  const std::string wanted = content(folder / "a.isohf");
-  for (std::int64_t row = 10; row < 150; row += 9) {
-    std::filesystem::remove(folder / "b.isohf.part");
-    std::filesystem::remove(folder / "b.isohf.part.journal");
-    Hills failing;
-    options.resume = false;
-    failing.fail_from_row = row;
-    EXPECT_THROW((void)convert(failing, folder / "b.isohf", options), Error);
-    options.resume = true;
-    (void)convert(source, folder / "b.isohf", options);
-    ASSERT_EQ(content(folder / "b.isohf"), wanted) << "interrupted at row " << row;
-    std::filesystem::remove(folder / "b.isohf");
   }
 }
 

@@ -66,9 +66,8 @@ ConvertOptions options_for(const std::string& projection) {
   return options;
 }
 
-ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options,
-                   const Job& job = {}) {
-  return convert(source, output, options, job);
+ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options) {
+  return convert(source, output, options);
 }
 
 const Ground kGrounds[] = {{"Earth", {}, {-3.0, 42.0, 5.0, 50.0}},
@@ -172,22 +171,6 @@ TEST(ProjectedArchive, HeightsLieAtTheirLongitudeAndLatitude) {
       }
       EXPECT_GT(compared, 50000);
     }
-  }
-}
-
-TEST(ProjectedArchive, BytesDoNotDependOnThreads) {
-  const test::TemporaryFolder folder;
-  const auto owner = source_over(kGrounds[0], 200, 220);
-  Source& source = *owner;
-  std::string hash;
-  for (const int threads : {1, 2, 5}) {
-    ConvertOptions options = options_for("lambert-conformal");
-    options.filter = filter_from_string("bspline3");
-    options.overwrite = true;
-    (void)run(source, folder / "a.isohf", options, {.threads = threads});
-    const std::string found = ArchiveReader(folder / "a.isohf").metadata().content_sha256;
-    EXPECT_EQ(hash.empty() ? found : hash, found);
-    hash = found;
   }
 }
 

@@ -165,19 +165,6 @@ TEST(SeedStage, ArchivesWithSeedsVerifyAndUnzip) {
   EXPECT_EQ(unzip.exit_code, 0) << unzip.out << unzip.err;
 }
 
-TEST(SeedStage, BytesDoNotDependOnThreads) {
-  const test::TemporaryFolder folder;
-  Ridges source;
-  std::string first;
-  for (const int threads : {1, 2, 5}) {
-    ConvertOptions options = options_with({2.0, {}});
-    (void)run(source, folder / "a.isohf", options, {.threads = threads});
-    const std::string bytes = test::read_file(folder / "a.isohf");
-    if (first.empty()) first = bytes;
-    ASSERT_TRUE(bytes == first) << threads;
-  }
-}
-
 TEST(SeedStage, AResumeFromAnyTileGivesTheSameBytes) {
   const test::TemporaryFolder folder;
   Ridges source;

@@ -16,13 +16,13 @@
 namespace isohf {
 namespace {
 
-ConvertSummary convert_to(HeightSource& source, const std::string& path, ConvertOptions options, const Job& job = {}) {
+ConvertSummary convert_to(HeightSource& source, const std::string& path, ConvertOptions options) {
   options.plan.shape = {20, 19};
   options.plan.levels = 4;
   options.lossless = true;
   options.overwrite = true;
   options.producer = "isohf test";
-  return convert(source, path, options, job);
+  return convert(source, path, options);
 }
 
 void expect_exact(HeightSource& source, const std::string& path, const std::string& what) {
@@ -101,18 +101,6 @@ TEST(SourceRowReader, RefusesAnArchiveWithoutResiduals) {
   (void)convert(source, folder / "a.isohf");
   const ArchiveReader archive(folder / "a.isohf");
   EXPECT_THROW(SourceRowReader{archive}, Error);
-}
-
-TEST(Lossless, BytesDoNotDependOnThreads) {
-  const test::TemporaryFolder folder;
-  test::MemorySource<std::int16_t> source(SampleType::kInt16, 90, 75,
-                                          [](std::int64_t c, std::int64_t r) { return std::round(hill(c, r)); });
-  convert_to(source, folder / "one.isohf", {}, {.threads = 1});
-  convert_to(source, folder / "four.isohf", {}, {.threads = 4});
-  const ArchiveReader one(folder / "one.isohf");
-  const ArchiveReader four(folder / "four.isohf");
-  EXPECT_EQ(one.metadata_json(), four.metadata_json());
-  EXPECT_EQ(one.read_member(residual_name(0)), four.read_member(residual_name(0)));
 }
 
 }  // namespace

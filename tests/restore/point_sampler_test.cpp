@@ -5,7 +5,6 @@
 
 #include <atomic>
 #include <cmath>
-#include <limits>
 #include <random>
 #include <vector>
 
@@ -92,38 +91,6 @@ void expect_same(const SurfaceSample& found, const SurfaceSample& wanted) {
   if (wanted.state != SurfaceState::kSurface) return;
   EXPECT_EQ(found.elevation, wanted.elevation);
   EXPECT_EQ(found.normal, wanted.normal);
-}
-
-TEST(PointSampler, FindsElevationsAtAnyPointInAnyOrder) {
-  const TileGrid grid = TileGrid::make(TileShape::make(20, 19, 4), 3, 2, 16.0, 16.0 * std::sqrt(0.75));
-  const auto plane = [](double x, double z) { return 3.0 * x - 2.0 * z + 100.0; };
-  const auto read_one = [&](TileIndex tile) {
-    TileCodes codes;
-    codes.type = CodeType::kF32;
-    for (int r = 0; r < grid.shape().rows(); ++r) {
-      for (int c = 0; c < grid.shape().columns(); ++c) {
-        const WorldPoint at = grid.world_from_lattice(grid.lattice_vertex(tile, {c, r}));
-        codes.heights.push_back(static_cast<float>(plane(at.x, at.z)));
-      }
-    }
-    return codes;
-  };
-  const ReadTiles read = [&](std::span<const TileIndex> tiles) {
-    std::vector<TileCodes> all;
-    for (const TileIndex tile : tiles) all.push_back(read_one(tile));
-    return all;
-  };
-  PointSampler surface(grid, {CodeType::kF32, 0.0, 1.0}, read, 5000);  // two tiles and a half
-  std::vector<WorldPoint> places;
-  for (int i = 0; i < 500; ++i) places.push_back({std::fmod(i * 17.31, 47.9), std::fmod(i * 5.77, 27.6)});
-  places.push_back({-0.1, 3.0});
-  places.push_back({std::numeric_limits<double>::quiet_NaN(), 3.0});
-  for (int pass = 0; pass < 2; ++pass) {
-    std::vector<double> found(places.size());
-    surface.sample(places, std::span(found));
-    for (std::size_t i = 0; i < 500; ++i) EXPECT_NEAR(found[i], plane(places[i].x, places[i].z), 1e-4) << i;
-    EXPECT_TRUE(std::isnan(found[500]) && std::isnan(found[501]));
-  }
 }
 
 TEST_P(PointSamplerTest, FindsWhatTheWholeTileHasAtAnyPlaceInAnyOrder) {

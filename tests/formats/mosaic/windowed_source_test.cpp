@@ -144,15 +144,5 @@ TEST(Decorators, PassOnWhatBuffersMayHoldAndCountTheirOwn) {
   EXPECT_LT(moved.buffer_bytes(4096), 4096U + fill + 4U * (720U * 5U * 2U + 8U * 72U * 2U + 72U * 16U));
 }
 
-TEST(FilledSource, NarrowWindowsHaveTheSameSamples) {
-  const std::unique_ptr<HeightSource> one = filled(std::make_unique<GlobeSource>());
-  const std::unique_ptr<HeightSource> other = filled(std::make_unique<GlobeSource>());
-  const std::vector<std::int16_t> whole = read(*one, {0, 0, 73, 37});
-  const std::vector<std::int16_t> part = read(*other, {18, 0, 9, 37});
-  for (std::size_t r = 0; r < 37; ++r) {
-    for (std::size_t c = 0; c < 9; ++c) EXPECT_EQ(part[r * 9 + c], whole[r * 73 + 18 + c]) << c << "," << r;
-  }
-}
-
 }  // namespace
 }  // namespace isohf::test
