@@ -336,7 +336,7 @@ void Soak::try_one(const std::string& path) {
 
 TEST_F(Soak, RandomConversionsHoldWhatASlowOracleSays) {
   const test::TemporaryFolder folder;
-  const std::uint64_t count = from_environment("ISOHF_SOAK", 150);
+  const std::uint64_t count = from_environment("ISOHF_SOAK", 60);
   const std::uint64_t first = from_environment("ISOHF_SOAK_SEED", 1);
   for (std::uint64_t seed = first; seed < first + count; ++seed) {
     SCOPED_TRACE("ISOHF_SOAK=1 ISOHF_SOAK_SEED=" + std::to_string(seed));
