@@ -1,8 +1,7 @@
 """Checks the structure that the sources' own includes draw: no cycle of modules, no room with too many doors.
 
-usage: include_graph.py [--single] ROOT_FOLDER...   (from the top of the tree)
-A module is a header and the source of its name. A room is a folder; its doors are the files and folders in it.
-With --single, headers that one file alone includes are listed too (to look at, not findings)."""
+usage: include_graph.py ROOT_FOLDER...   (from the top of the tree)
+A module is a header and the source of its name. A room is a folder; its doors are the files and folders in it."""
 import collections
 import os
 import re
@@ -51,11 +50,9 @@ def cycles(graph):
     return found
 
 
-def main(arguments):
-    single = "--single" in arguments
-    folders = [a for a in arguments if not a.startswith("-")]
+def main(folders):
     files = set(sources(folders))
-    graph, users = collections.defaultdict(set), collections.defaultdict(set)
+    graph = collections.defaultdict(set)
     for file in sorted(files):
         module = os.path.splitext(file)[0]
         graph[module]
@@ -64,7 +61,6 @@ def main(arguments):
                 other = resolve(name, file, files)
                 if other and os.path.splitext(other)[0] != module:
                     graph[module].add(os.path.splitext(other)[0])
-                    users[other].add(file)
     for component in cycles(graph):
         print("include cycle: " + ", ".join(component))
     for folder in folders:
@@ -72,10 +68,6 @@ def main(arguments):
             doors = len(rooms) + len([name for name in names if not name.startswith(".")])
             if doors > MOST_DOORS:
                 print(f"{path}: {doors} files and folders, {MOST_DOORS} are the most")
-    if single:
-        for file in sorted(files):
-            if file.endswith(".h") and len(users[file]) == 1:
-                print(f"note: only {next(iter(users[file]))} includes {file}")
 
 
 main(sys.argv[1:])
