@@ -157,12 +157,6 @@ namespace isohf {
 /// would read, with a warning when there are others.
 [[nodiscard]] std::unique_ptr<HeightSource> open_npz(const std::string& path, const OpenOptions& options);
 
-/// A layer of an ERDAS Imagine file (Imagine 8, HFA; the format is that of GDAL's and of ERDAS's own notes): integers of 1 to
-/// 32 bits and floats in tiles, plain, run-length-coded, or in a spill file (.ige) beside; options.channel picks a layer
-/// by its number or name. Eimg_NonInitializedValue is nodata, and tiles that were never written are void.
-[[nodiscard]] bool looks_like_imagine(std::span<const std::byte> head);
-[[nodiscard]] std::unique_ptr<HeightSource> open_imagine(const std::string& path, const OpenOptions& options);
-
 /// A USGS DEM (Standards for Digital Elevation Models, part 2: type A and B records of 1024 bytes, with or without line
 /// ends): profiles from West to East, each from South to North, in metres, feet or seconds of arc. What lies beyond the
 /// sides of a UTM quadrangle is nodata, as is -32767. Samples are posts, int16 or, where the header's range needs it,

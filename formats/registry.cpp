@@ -12,6 +12,7 @@
 #include <span>
 
 #include "formats/files/file_stamp.h"
+#include "formats/files/foreign_file.h"
 #include "formats/files/raw_file.h"
 #include "formats/files/text.h"
 #include "formats/georeference/reference_system.h"
@@ -62,7 +63,6 @@ const std::vector<Reader>& readers() {
       {{"GridFloat or EHdr header", {".hdr"}}, looks_like_grid_header, open_header_grid},
       {{"GridFloat", {".flt"}}, nullptr, open_header_grid},
       {{"EHdr", {".bil", ".bip", ".bsq"}}, nullptr, open_header_grid},
-      {{"ERDAS Imagine", {".img"}, nullptr, "takes `channel`"}, looks_like_imagine, open_imagine, nullptr, true},
       {{"PDS3", {".img", ".lbl"}, nullptr, "takes `channel`"}, looks_like_pds3, open_pds3, has_pds3_label, true},
       {{"PDS4", {".lblx"}, nullptr, "takes `channel`"}, looks_like_pds4, open_pds4, is_pds4},
       {{"ISIS3 cube", {".cub", ".lbl"}, nullptr, "takes `channel`"}, looks_like_isis3, open_isis3, nullptr, true},
@@ -129,6 +129,7 @@ bool has_extension(const std::string& path, const Format& format) {
 }
 
 const Reader* reader_of(const std::string& path, std::span<const std::byte> head) {
+  if (is_foreign_raster(path, head)) return nullptr;
   for (const Reader& reader : readers()) {
     if (reader.recognises != nullptr ? reader.recognises(head) : has_extension(path, reader.format)) return &reader;
   }

@@ -6,6 +6,8 @@
 #include <fstream>
 #include <string_view>
 
+#include "formats/files/text.h"
+
 namespace isohf {
 namespace {
 
@@ -14,6 +16,23 @@ using namespace std::string_view_literals;
 constexpr const char* kGdal = "gdal_translate {} OUT.tif makes a GeoTIFF of it";
 constexpr const char* kRestore = "isohf restore {} OUT.tif makes a raster of it";
 constexpr const char* kUnpack = "unpack it first";
+
+/// A raster of another program.
+struct Raster {
+  const char* is;
+  bool (*found)(const std::string& path, std::string_view head);
+  const char* help = kGdal;
+};
+
+constexpr Raster kRasters[] = {
+    {"an ERDAS Imagine raster",
+     [](const std::string&, std::string_view head) { return head.starts_with("EHFA_HEADER_TAG"); }},
+};
+
+const Raster* raster_of(const std::string& path, std::string_view head) {
+  const auto* const found = std::ranges::find_if(kRasters, [&](const Raster& each) { return each.found(path, head); });
+  return found == std::ranges::end(kRasters) ? nullptr : found;
+}
 
 struct Signature {
   std::string_view bytes;
@@ -25,7 +44,6 @@ struct Signature {
 constexpr Signature kSignatures[] = {
     {"isohf.json"sv, "an isohf archive", kRestore, 30},
     {"mimetypeapplication/vnd.isohf"sv, "an isohf archive", kRestore, 30},
-    {"mimetypeapplication/vnd.isohf"sv, "an isohf archive", "isohf restore {} OUT.tif makes a raster of it", 30},
     {"PK\x03\x04"sv, "a ZIP file", "it is damaged or cut off"},
     {"\x1f\x8b"sv, "a gzip file", "gunzip it first"},
     {"BZh"sv, "a bzip2 file", kUnpack},
@@ -64,12 +82,19 @@ bool is_text(std::string_view head) {
 
 }  // namespace
 
+bool is_foreign_raster(const std::string& path, std::span<const std::byte> head) {
+  return raster_of(path, text_of(head)) != nullptr;
+}
+
 ForeignFile foreign_file(const std::string& path) {
   constexpr std::size_t kHeadBytes = 512;
   std::string head(kHeadBytes, '\0');
   std::ifstream file(path, std::ios::binary);
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(file.gcount()));
+  if (const Raster* const raster = raster_of(path, head)) {
+    return {raster->is, fmt::format(fmt::runtime(raster->help), path)};
+  }
   for (const Signature& signature : kSignatures) {
     if (head.size() < signature.at || !std::string_view(head).substr(signature.at).starts_with(signature.bytes))
       continue;

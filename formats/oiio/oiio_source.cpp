@@ -32,8 +32,9 @@ const IsohfOiioModule& oiio_module() {
 /// `why` says what is missing where the module would have been asked.
 [[noreturn]] void refuse_unknown(const std::string& path, const std::string& why = {}) {
   const ForeignFile found = foreign_file(path);
-  std::string text = path + ": unknown format";
-  if (!found.is.empty()) text += ": this is " + found.is;
+  std::string text = path + ": ";
+  if (found.help.empty()) text += found.is.empty() ? "unknown format" : "unknown format: ";
+  if (!found.is.empty()) text += "this is " + found.is;
   text += found.help.empty() ? "; isohf formats lists what is read" : "; " + found.help;
   throw Error(ErrorCode::kUnsupported, why.empty() || !found.help.empty() ? text : text + " (" + why + ")");
 }
@@ -200,6 +201,7 @@ class OiioRows final : public PhotoRows {
 }  // namespace
 
 std::unique_ptr<HeightSource> open_with_oiio(const std::string& path, const OpenOptions& options) {
+  if (!foreign_file(path).help.empty()) refuse_unknown(path);
   const IsohfOiioModule* module = nullptr;
   try {
     module = &oiio_module();

@@ -6,7 +6,6 @@
 
 #include "formats/files/tar_archive.h"
 #include "formats/files/zip_archive.h"
-#include "formats/grids/imagine_bytes.h"
 #include "formats/grids/netcdf_bytes.h"
 #include "formats/planetary/pds4_label.h"
 #include "formats/readers.h"
@@ -336,9 +335,6 @@ std::vector<ReaderCase> reader_cases() {
       {"Pds4Label", "a.xml", pds4_label("a.dat"), open_pds4, {}},
       {"Pds4Samples", "a.dat", counting(7, 2), open_pds4, {}},
       {"StreamedAsciiGrid", "a.asc.gz", gzip(esri + numbers), open_ascii_grid, streamed},
-      {"Imagine", "a.img", ImagineBytes().file(false), open_imagine, {}},
-      {"ImagineSpilling", "a.img", ImagineBytes().file(true), open_imagine, {}},
-      {"ImagineSpilled", "a.ige", ImagineBytes::spill(), open_imagine, {}},
       {"ZipOfGrid", "a.zip", zip("d/a.asc", esri + numbers), open_packed, {}},
       {"TarOfGrid", "a.tar", tar_archive({{"d/a.asc", esri + numbers}}), open_packed, {}},
       {"Jpeg2000", "a.j2k", read_file(data + "signed8.j2k"), open_jp2, {}},
@@ -428,9 +424,6 @@ std::vector<ReaderCase> reader_cases() {
   find("RawDescription").shortest_valid = find("RawDescription").bytes.size() - 1;
   find("TiffStripsDeflated").shortest_valid = 1;  // the tags that isohf writes come last, and not all are needed
   find("TiffMasked").shortest_valid = 1;          // the mask's directory, without which the image opens with a warning
-  find("ImagineSpilling").beside = {{"a.ige", ImagineBytes::spill()}};
-  find("ImagineSpilled").opened = "a.img";
-  find("ImagineSpilled").beside = {{"a.img", ImagineBytes().file(true)}};
   for (const char* name : {"ZipOfGrid", "TarOfGrid"}) find(name).share = 4;
   find("Hgt").shortest_valid = 1;  // another square
   return cases;

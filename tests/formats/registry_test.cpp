@@ -30,6 +30,17 @@ Error refusal(const std::string& path) {
   return error_of([&] { (void)open_raster(path, {}); });
 }
 
+/// Whether this process has loaded one of these libraries.
+bool is_loaded(std::initializer_list<const char*> libraries) {
+  std::ifstream maps("/proc/self/maps");
+  for (std::string line; std::getline(maps, line);) {
+    for (const char* library : libraries) {
+      if (line.find(library) != std::string::npos) return true;
+    }
+  }
+  return false;
+}
+
 TEST(OpenSource, NamesWhatIsWrongWithAPath) {
   const TemporaryFolder folder;
   const std::string missing = folder / "missing.exr";
@@ -155,6 +166,34 @@ TEST(OpenSource, NamesForeignFilesAndTheCommandThatHelps) {
   }
 }
 
+/// Rasters of other programs: the plug-in is not loaded for them.
+TEST(OpenSource, NamesTheCommandThatConvertsARasterOfAnotherProgram) {
+  set_module_folder(ISOHF_BIN_DIR);
+  struct Row {
+    std::string name;  ///< of the file
+    std::string bytes;
+    std::string says;  ///< after the path, up to the command
+    std::string command = "gdal_translate";
+    std::string beside = {};  ///< another file that is there
+  };
+  const Row rows[] = {
+      {"a.img", "EHFA_HEADER_TAG", "an ERDAS Imagine raster"},
+  };
+  for (const Row& row : rows) {
+    SCOPED_TRACE(row.name);
+    const TemporaryFolder folder;
+    const std::string path = folder / row.name;
+    write_file(path, row.bytes);
+    if (!row.beside.empty()) write_file(folder / row.beside, "");
+    EXPECT_EQ(native_format_of(path, {}), nullptr);
+    const Error error = refusal(path);
+    EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
+    EXPECT_THAT(error.what(), HasSubstr(path + ": this is " + row.says + "; " + row.command + ' ' + path));
+  }
+  EXPECT_FALSE(is_loaded({"libgdal", "OpenImageIO", "isohf_oiio"}));
+  set_module_folder("");
+}
+
 TEST(OpenSource, GoesByContentNotByName) {
   if (real_files().empty()) GTEST_SKIP() << kNoRealFiles;
   const TemporaryFolder folder;
@@ -176,12 +215,7 @@ TEST(OpenSource, LoadsNoOtherImageLibraryForNativeFormats) {
     const auto source = open_raster(std::string(ISOHF_SOURCE_DIR "/testdata/") + name, {});
     (void)read_window(*source, {0, 0, source->info().width, 2});
   }
-  std::ifstream maps("/proc/self/maps");
-  for (std::string line; std::getline(maps, line);) {
-    for (const char* library : {"libgdal", "OpenImageIO", "isohf_oiio"}) {
-      EXPECT_EQ(line.find(library), std::string::npos) << line;
-    }
-  }
+  EXPECT_FALSE(is_loaded({"libgdal", "OpenImageIO", "isohf_oiio"}));
 }
 
 TEST(Formats, AreListedWithTheLibraryThatReadsThem) {

@@ -134,8 +134,6 @@ class Maker:
         self.add("netCDF classic", "classic.nc", self.integers, "-of", "netCDF")
         self.add("netCDF-4, Deflate", "deflated.nc", self.integers, "-of", "netCDF", "-co", "FORMAT=NC4", "-co",
                  "COMPRESS=DEFLATE")
-        self.add("ERDAS Imagine", "tiles.img", self.integers, "-of", "HFA")
-        self.add("ERDAS Imagine, compressed", "coded.img", self.integers, "-of", "HFA", "-co", "COMPRESSED=YES")
         self.add("VRT of a GeoTIFF", "land_tif.vrt", self.integers, "-of", "VRT")
         self.add("XYZ text", "land.xyz", self.text, "-of", "XYZ")
 

@@ -219,11 +219,10 @@ TEST_F(GdalVariants, WhatGdalKeepsBesideSaysWhatSamplesMean) {
     for (const char* more : {"-a_scale", "0.1", "-a_offset", "800"}) options.emplace_back(more);
     return Variant{name, options};
   };
-  for (const Variant& variant :
-       {scaled("a.asc", {"-of", "AAIGrid", "-a_nodata", "-9999"}), scaled("b.bil", {"-of", "EHdr", "-a_nodata", "7"}),
-        scaled("c.sdat", {"-of", "SAGA"}), scaled("d.img", {"-of", "HFA", "-a_nodata", "7"}),
-        scaled("e.rst", {"-of", "RST"}), scaled("f.dem", {"-of", "ROI_PAC", "-a_nodata", "7"}),
-        scaled("g.dat", {"-of", "ENVI"}), scaled("h.xyz", {"-of", "XYZ"})}) {
+  for (const Variant& variant : {scaled("a.asc", {"-of", "AAIGrid", "-a_nodata", "-9999"}),
+                                 scaled("b.bil", {"-of", "EHdr", "-a_nodata", "7"}), scaled("c.sdat", {"-of", "SAGA"}),
+                                 scaled("e.rst", {"-of", "RST"}), scaled("f.dem", {"-of", "ROI_PAC", "-a_nodata", "7"}),
+                                 scaled("g.dat", {"-of", "ENVI"}), scaled("h.xyz", {"-of", "XYZ"})}) {
     expect_same("whole.tif", variant);
   }
   for (const Variant& variant : {scaled("text.grd", {"-of", "GSAG"}), scaled("six.grd", {"-of", "GSBG"})}) {

@@ -173,7 +173,6 @@ READERS = {
     "SAGA": (".sdat", create("SAGA")),
     "PNG, .aux.xml": (".png", create("PNG", kind=gdal.GDT_UInt16)),
     "JPEG 2000": (".jp2", create("JP2OpenJPEG", ["REVERSIBLE=YES", "QUALITY=100"], gdal.GDT_UInt16)),
-    "ERDAS Imagine": (".img", create("HFA")),
     "IDRISI": (".rst", without_heights("RST")),
     "ROI_PAC": (".dem", without_heights("ROI_PAC")),
     "USGS DEM": (".dem", without_heights("USGSDEM", ("wgs1984", "northamericandatum1983", "northamericandatum1927"))),

@@ -7,7 +7,6 @@
 
 #include <cstring>
 
-#include "formats/grids/imagine_bytes.h"
 #include "formats/grids/netcdf_bytes.h"
 #include "formats/planetary/pds4_label.h"
 #include "formats/reader_failure.h"
@@ -748,23 +747,6 @@ TEST_F(Graymap, BytesAreAsStoredAndDamageIsTold) {
   for (const char* header : {"P5", "P5 ", "P5 # 3 2 9", "P5 3 2", "P5 3 x 9 abc", "P5 0 2 9 "}) {
     write("a.pgm", header);
     EXPECT_THAT(failure("a.pgm"), HasSubstr("a.pgm: ")) << header;
-  }
-}
-
-TEST(Imagine, RunsAndPlainTilesAreTheSamples) {
-  const TemporaryFolder folder;
-  for (const bool spills : {false, true}) {
-    write_file(folder / "a.img", ImagineBytes().file(spills));
-    write_file(folder / "a.ige", ImagineBytes::spill());
-    const auto source = open_raster(folder / "a.img", {});
-    const std::vector<double> values = values_of(*source);
-    ASSERT_EQ(values.size(), 60U);
-    EXPECT_EQ(values[0], 16.0);
-    EXPECT_EQ(values[9], 33.0);
-    EXPECT_EQ(values[50], spills ? 16.0 : 19.0);  // the 41st sample of the tile
-    EXPECT_EQ(source->info().georeference.origin_x, 500000.0);
-    EXPECT_EQ(source->info().georeference.spacing_y, 10.0);
-    EXPECT_EQ(source->info().void_values, std::vector<double>{5.0});
   }
 }
 
