@@ -157,13 +157,6 @@ namespace isohf {
 /// would read, with a warning when there are others.
 [[nodiscard]] std::unique_ptr<HeightSource> open_npz(const std::string& path, const OpenOptions& options);
 
-/// A USGS DEM (Standards for Digital Elevation Models, part 2: type A and B records of 1024 bytes, with or without line
-/// ends): profiles from West to East, each from South to North, in metres, feet or seconds of arc. What lies beyond the
-/// sides of a UTM quadrangle is nodata, as is -32767. Samples are posts, int16 or, where the header's range needs it,
-/// int32; the vertical resolution is their scale. Memory: one entry for each column, one profile at a time.
-[[nodiscard]] bool looks_like_usgs_dem(std::span<const std::byte> head);  ///< by bytes 144 to 168 of record A
-[[nodiscard]] std::unique_ptr<HeightSource> open_usgs_dem(const std::string& path, const OpenOptions& options);
-
 /// A DTED cell of any level (MIL-PRF-89020B): columns of posts from South to North, each a record with a checksum,
 /// sign-magnitude metres, nodata -32767. A column's record is checked when it is first touched, its checksum unless
 /// options.ignore_checksums.

@@ -68,7 +68,6 @@ const std::vector<Reader>& readers() {
       {{"ISIS3 cube", {".cub", ".lbl"}, nullptr, "takes `channel`"}, looks_like_isis3, open_isis3, nullptr, true},
       {{"NumPy", {".npy"}}, looks_like_npy, open_npy, nullptr, true},
       {{"NumPy archive", {".npz"}, nullptr, "takes `channel`"}, nullptr, open_npz},
-      {{"USGS DEM", {".dem"}}, looks_like_usgs_dem, open_usgs_dem, nullptr, true},
       {{"GTOPO30", {".dem"}}, nullptr, open_header_grid},
       {{"DTED", {".dt0", ".dt1", ".dt2"}}, looks_like_dted, open_dted, nullptr, true},
       {{"Surfer grid", {".grd"}}, looks_like_surfer_grid, open_surfer_grid, nullptr, true},

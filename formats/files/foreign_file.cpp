@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <fstream>
 #include <string_view>
+#include <utility>
 
 #include "formats/files/text.h"
 
@@ -24,9 +26,29 @@ struct Raster {
   const char* help = kGdal;
 };
 
+/// Whether text begins a record of type A (USGS, Standards for Digital Elevation Models, part 2): codes in columns of six.
+bool is_usgs_dem(std::string_view head) {
+  constexpr std::size_t kCodes = 144;
+  constexpr std::size_t kColumn = 6;
+  constexpr std::pair<int, int> kRanges[] = {{0, 9}, {1, 4}, {-9999, 99}, {-9999, 9999}};
+  if (head.size() < kCodes + std::size(kRanges) * kColumn) return false;
+  head = head.substr(0, kCodes + std::size(kRanges) * kColumn);
+  if (!std::ranges::all_of(head, [](char c) { return c >= ' ' && c <= '~'; })) return false;
+  for (std::size_t i = 0; i < std::size(kRanges); ++i) {
+    const std::string text = trimmed(head.substr(kCodes + i * kColumn, kColumn));
+    if (i == 1 && text.empty()) continue;
+    int code = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), code);
+    if (error != std::errc{} || end != text.data() + text.size()) return false;
+    if (code < kRanges[i].first || code > kRanges[i].second) return false;
+  }
+  return true;
+}
+
 constexpr Raster kRasters[] = {
     {"an ERDAS Imagine raster",
      [](const std::string&, std::string_view head) { return head.starts_with("EHFA_HEADER_TAG"); }},
+    {"a USGS DEM", [](const std::string&, std::string_view head) { return is_usgs_dem(head); }},
 };
 
 const Raster* raster_of(const std::string& path, std::string_view head) {

@@ -111,7 +111,7 @@ class Agreement {
 
 void agree_on_heights(ReferenceSystem& ours, const ReferenceSystem& other, Agreement& agreement) {
   agreement.same(ours.body, other.body, "body");
-  // A .hgt, DTED or USGS DEM names what its heights are above, by no code.
+  // A .hgt or DTED names what its heights are above, by no code.
   const auto contradicts = [](const ReferenceSystem& one, const ReferenceSystem& two) {
     const bool is_name = one.vertical_datum == "EGM96" || one.vertical_datum == "NAVD88";
     return is_name && !one.vertical_epsg && !two.vertical_datum.empty() &&

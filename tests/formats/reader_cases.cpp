@@ -138,26 +138,6 @@ std::string npy() {
   return std::string("\x93NUMPY\1\0\x76\0", 10) + text + "\n" + counting(12, 2);
 }
 
-std::string usgs_dem() {
-  const std::string zero = "   0.000000000000000D+00";
-  std::string text(144, ' ');
-  text += fmt::format("{:6}{:6}{:6}{:6}", 1, 1, 1, 12);
-  for (int i = 0; i < 15; ++i) text += zero;
-  text += fmt::format("{:6}{:6}{:6}", 2, 2, 4);
-  for (int i = 0; i < 11; ++i) text += zero;
-  text += "     0";
-  for (int i = 0; i < 3; ++i) text += "1.000000E+01";
-  text += fmt::format("{:6}{:6}", 1, 3) + std::string(24, ' ') + " 2 1";
-  text.resize(1024, ' ');
-  for (int c = 0; c < 3; ++c) {
-    std::string profile = fmt::format("{:6}{:6}{:6}{:6}{:24}{}{}{}{}", 1, c + 1, 4, 1, 10 * c, zero, zero, zero, zero);
-    for (int p = 0; p < 4; ++p) profile += fmt::format("{:6}", 100 * c + p);
-    profile.resize(1024, ' ');
-    text += profile;
-  }
-  return text;
-}
-
 std::vector<std::byte> bytes_of(const std::string& text) {
   const auto bytes = std::as_bytes(std::span(text));
   return {bytes.begin(), bytes.end()};
@@ -311,7 +291,6 @@ std::vector<ReaderCase> reader_cases() {
       {"Npz", "a.npz", zip("z.npy", npy()), open_npz, {}},
       {"NpzZip64", "a.npz", zip("z.npy", npy(), true), open_npz, {}},
       {"Dted", "a.dt0", dted(), open_dted, {}},
-      {"UsgsDem", "a.dem", usgs_dem(), open_usgs_dem, {}},
       {"Hgt", "N10E010.hgt", counting(25, 2), open_hgt, {}},
       {"ZippedHgt", "N10E010.hgt.zip", zip("N10E010.hgt", counting(25, 2)), open_hgt, {}},
       {"SurferText", "a.grd", "DSAA\n4 3\n100 130\n200 220\n0 9\n" + numbers, open_surfer_grid, {}},
@@ -392,8 +371,8 @@ std::vector<ReaderCase> reader_cases() {
   picture.opened = "described.png";
   picture.beside = {{picture.opened, written(folder, picture.opened, 6, 5, SampleType::kUint16)}};
   picture.bytes = read_file(folder / picture.file_name);
-  for (const char* name : {"EsriAsciiGrid", "GrassAsciiGrid", "Pds3", "Isis3", "Isis3Label", "Dted", "UsgsDem",
-                           "PngDescription", "RawDescription", "Npy", "SurferText", "Vrt", "Pds4Label", "XyzText"}) {
+  for (const char* name : {"EsriAsciiGrid", "GrassAsciiGrid", "Pds3", "Isis3", "Isis3Label", "Dted", "PngDescription",
+                           "RawDescription", "Npy", "SurferText", "Vrt", "Pds4Label", "XyzText"}) {
     find(name).text = true;
   }
   // The last digits of a text can be missing without trace; a world file, a .prj and a label's last words are not
@@ -404,7 +383,6 @@ std::vector<ReaderCase> reader_cases() {
   find("EhdrWorldFile").shortest_valid = 1;
   find("EhdrProjection").shortest_valid = 1;
   find("Isis3Label").shortest_valid = find("Isis3Label").bytes.size() - 1;
-  find("UsgsDem").shortest_valid = find("UsgsDem").bytes.find_last_not_of(' ') + 1;
   ReaderCase& roi_pac = find("RoiPacHeader");
   roi_pac.text = true;
   roi_pac.shortest_valid = 1;

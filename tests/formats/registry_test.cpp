@@ -177,6 +177,7 @@ TEST(OpenSource, NamesTheCommandThatConvertsARasterOfAnotherProgram) {
     std::string beside = {};  ///< another file that is there
   };
   const Row rows[] = {
+      {"a.dem", std::string(144, ' ') + "     1     1     1    12", "a USGS DEM"},
       {"a.img", "EHFA_HEADER_TAG", "an ERDAS Imagine raster"},
   };
   for (const Row& row : rows) {

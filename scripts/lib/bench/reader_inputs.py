@@ -83,12 +83,10 @@ class Maker:
         side = self.degree[0]
         half = 0.5 / (side - 1)
         posts = [*DEGREE, 6 - half, 46 + half, 7 + half, 45 - half]
-        whole = [*DEGREE, 6, 46, 7, 45]
         self.add("ESRI ASCII grid, whole numbers", "whole.asc", self.text, "-of", "AAIGrid")
         self.add("ESRI ASCII grid, fractions", "fractions.asc", self.text, "-of", "AAIGrid", "-co", "DECIMAL_PRECISION=3",
                  *FRACTIONS)
         self.add("Surfer text grid", "text.grd", self.text, "-of", "GSAG", *FRACTIONS)
-        self.add("USGS DEM", "land.dem", self.text, "-of", "USGSDEM", *whole)
         self.add("DTED", "n45_e006.dt1" if side == 1201 else "n45_e006.dt2", self.degree, "-of", "DTED", *posts)
         self.add("SRTM HGT", "N45E006.hgt", self.degree, "-of", "SRTMHGT", *posts)
 

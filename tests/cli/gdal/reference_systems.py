@@ -175,7 +175,6 @@ READERS = {
     "JPEG 2000": (".jp2", create("JP2OpenJPEG", ["REVERSIBLE=YES", "QUALITY=100"], gdal.GDT_UInt16)),
     "IDRISI": (".rst", without_heights("RST")),
     "ROI_PAC": (".dem", without_heights("ROI_PAC")),
-    "USGS DEM": (".dem", without_heights("USGSDEM", ("wgs1984", "northamericandatum1983", "northamericandatum1927"))),
     "PDS4": (".xml", of_other_bodies("PDS4")),
     "ISIS3": (".cub", of_other_bodies("ISIS3")),
 }

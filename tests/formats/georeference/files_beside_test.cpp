@@ -19,10 +19,25 @@ constexpr const char* kAuxiliary =
 
 TEST(FilesBeside, GdalsSaysWhatTheSamplesOfEveryGridMeanBesideAPrjToo) {
   set_module_folder(ISOHF_BIN_DIR);
-  constexpr std::array kGrids = {"EsriAsciiGrid", "GrassAsciiGrid", "EhdrHeader", "EhdrProjection", "GridFloatSamples",
-                                 "Dted",          "UsgsDem",        "Hgt",        "SurferText",     "Surfer6",
-                                 "Surfer7",       "EnviHeader",     "SagaHeader", "IdrisiHeader",   "RoiPacHeader",
-                                 "XyzText",       "Graymap",        "Npy",        "TiffTagsFirst",  "TiffTiles",
+  constexpr std::array kGrids = {"EsriAsciiGrid",
+                                 "GrassAsciiGrid",
+                                 "EhdrHeader",
+                                 "EhdrProjection",
+                                 "GridFloatSamples",
+                                 "Dted",
+                                 "Hgt",
+                                 "SurferText",
+                                 "Surfer6",
+                                 "Surfer7",
+                                 "EnviHeader",
+                                 "SagaHeader",
+                                 "IdrisiHeader",
+                                 "RoiPacHeader",
+                                 "XyzText",
+                                 "Graymap",
+                                 "Npy",
+                                 "TiffTagsFirst",
+                                 "TiffTiles",
                                  "PngGray16"};
   std::size_t tried = 0;
   for (const ReaderCase& each : reader_cases()) {
@@ -41,10 +56,10 @@ TEST(FilesBeside, GdalsSaysWhatTheSamplesOfEveryGridMeanBesideAPrjToo) {
                  "PRIMEM[\"Greenwich\",0.0],UNIT[\"Degree\",0.0174532925199433]]");
     }
     const SourceInfo info = each.open(path, each.options)->info();
-    // GDAL takes ENVI's and ROI_PAC's headers for less, and multiplies the samples of a USGS DEM before.
+    // GDAL takes ENVI's and ROI_PAC's headers for less.
     const bool goes_first = each.name == "EnviHeader" || each.name == "RoiPacHeader";
-    const bool is_scaled = !goes_first && each.name != "UsgsDem" && (own.z_scale != 1.0 || own.z_offset != 0.0);
-    EXPECT_EQ(info.z_scale, is_scaled ? own.z_scale : each.name == "UsgsDem" ? 0.5 * own.z_scale : 0.5);
+    const bool is_scaled = !goes_first && (own.z_scale != 1.0 || own.z_offset != 0.0);
+    EXPECT_EQ(info.z_scale, is_scaled ? own.z_scale : 0.5);
     EXPECT_EQ(info.z_offset, is_scaled ? own.z_offset : 100.0);
     EXPECT_EQ(info.vertical_unit, own.vertical_unit.empty() ? "kilometre" : own.vertical_unit);
     const bool has_own_void = !own.void_values.empty() && !goes_first;
