@@ -163,12 +163,6 @@ namespace isohf {
 [[nodiscard]] bool looks_like_dted(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_dted(const std::string& path, const OpenOptions& options);
 
-/// A grid of Golden Software's Surfer: text (DSAA), Surfer 6 (DSBB, float32) or Surfer 7 (DSRB, float64), rows from
-/// South to North; the numbers of text come as float64. Nodes are points; their unit and system are unknown but for a
-/// .prj beside. Blanked nodes, 1.70141e38 and above or the grid's own value, are nodata.
-[[nodiscard]] bool looks_like_surfer_grid(std::span<const std::byte> head);
-[[nodiscard]] std::unique_ptr<HeightSource> open_surfer_grid(const std::string& path, const OpenOptions& options);
-
 /// Points of a regular grid in text: x, y and z on each line, in any order of lines, some of them missing perhaps; blanks,
 /// commas or semicolons (with decimal commas) between them, a line of names, comments (#). Elevations that are all whole
 /// are int32, any others float64; points are posts. Opening reads the text twice, and puts the elevations into a file

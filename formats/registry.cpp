@@ -70,7 +70,6 @@ const std::vector<Reader>& readers() {
       {{"NumPy archive", {".npz"}, nullptr, "takes `channel`"}, nullptr, open_npz},
       {{"GTOPO30", {".dem"}}, nullptr, open_header_grid},
       {{"DTED", {".dt0", ".dt1", ".dt2"}}, looks_like_dted, open_dted, nullptr, true},
-      {{"Surfer grid", {".grd"}}, looks_like_surfer_grid, open_surfer_grid, nullptr, true},
       {{"XYZ text", {".xyz"}}, looks_like_xyz, open_xyz, is_xyz, true},
       {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt, is_zip_of_hgt, true},
       {{"ZIP, tar", {".zip", ".tar", ".tgz"}, nullptr, "takes `part`"}, looks_like_tar, open_packed, is_zip, true},

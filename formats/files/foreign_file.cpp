@@ -48,6 +48,10 @@ bool is_usgs_dem(std::string_view head) {
 constexpr Raster kRasters[] = {
     {"an ERDAS Imagine raster",
      [](const std::string&, std::string_view head) { return head.starts_with("EHFA_HEADER_TAG"); }},
+    {"a Surfer grid",
+     [](const std::string&, std::string_view head) {
+       return head.starts_with("DSAA") || head.starts_with("DSBB") || head.starts_with("DSRB");
+     }},
     {"a USGS DEM", [](const std::string&, std::string_view head) { return is_usgs_dem(head); }},
 };
 

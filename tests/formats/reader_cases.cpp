@@ -166,21 +166,6 @@ std::string little(T value) {
   return {reinterpret_cast<const char*>(&value), sizeof(value)};
 }
 
-std::string surfer6() {
-  std::string bytes = "DSBB" + little(std::int16_t{4}) + little(std::int16_t{3});
-  for (const double value : {100.0, 130.0, 200.0, 220.0, 0.0, 9.0}) bytes += little(value);
-  for (int i = 0; i < 12; ++i) bytes += little(i == 5 ? 1.70141e38F : static_cast<float>(i));
-  return bytes;
-}
-
-std::string surfer7() {
-  std::string bytes = "DSRB" + little(4) + little(1) + "GRID" + little(72) + little(3) + little(4);
-  for (const double value : {100.0, 200.0, 10.0, 10.0, 0.0, 9.0, 0.0, 1.70141e38}) bytes += little(value);
-  bytes += "DATA" + little(96);
-  for (int i = 0; i < 12; ++i) bytes += little(static_cast<double>(i));
-  return bytes;
-}
-
 const char* const kEhdr =
     "BYTEORDER M\nLAYOUT BIL\nNROWS 3\nNCOLS 4\nNBANDS 1\nNBITS 16\nBANDROWBYTES 8\nTOTALROWBYTES 8\nBANDGAPBYTES 0\n"
     "PIXELTYPE SIGNEDINT\nNODATA -9999\nULXMAP 100.5\nULYMAP 200.5\nXDIM 0.5\nYDIM 0.5\n";
@@ -293,9 +278,6 @@ std::vector<ReaderCase> reader_cases() {
       {"Dted", "a.dt0", dted(), open_dted, {}},
       {"Hgt", "N10E010.hgt", counting(25, 2), open_hgt, {}},
       {"ZippedHgt", "N10E010.hgt.zip", zip("N10E010.hgt", counting(25, 2)), open_hgt, {}},
-      {"SurferText", "a.grd", "DSAA\n4 3\n100 130\n200 220\n0 9\n" + numbers, open_surfer_grid, {}},
-      {"Surfer6", "a.grd", surfer6(), open_surfer_grid, {}},
-      {"Surfer7", "a.grd", surfer7(), open_surfer_grid, {}},
       {"Vrt", "a.vrt", kVrt, open_vrt, {}},
       {"EnviHeader", "a.hdr", kEnvi, open_envi, {}},
       {"EnviSamples", "a.dat", "  " + counting(24, 2), open_envi, {}},
@@ -372,7 +354,7 @@ std::vector<ReaderCase> reader_cases() {
   picture.beside = {{picture.opened, written(folder, picture.opened, 6, 5, SampleType::kUint16)}};
   picture.bytes = read_file(folder / picture.file_name);
   for (const char* name : {"EsriAsciiGrid", "GrassAsciiGrid", "Pds3", "Isis3", "Isis3Label", "Dted", "PngDescription",
-                           "RawDescription", "Npy", "SurferText", "Vrt", "Pds4Label", "XyzText"}) {
+                           "RawDescription", "Npy", "Vrt", "Pds4Label", "XyzText"}) {
     find(name).text = true;
   }
   // The last digits of a text can be missing without trace; a world file, a .prj and a label's last words are not
@@ -397,7 +379,6 @@ std::vector<ReaderCase> reader_cases() {
   header.replace(header.find("utm-33n"), std::string("utm-33n").size(), "own");
   find("Vicar").shortest_valid = find("Vicar").bytes.size() - 20;  // the other band's, and its prefix
   find("XyzText").shortest_valid = find("XyzText").bytes.size() - 1;
-  find("SurferText").shortest_valid = find("SurferText").bytes.size() - 2;
   find("PngDescription").shortest_valid = find("PngDescription").bytes.size() - 1;
   find("RawDescription").shortest_valid = find("RawDescription").bytes.size() - 1;
   find("TiffStripsDeflated").shortest_valid = 1;  // the tags that isohf writes come last, and not all are needed

@@ -178,6 +178,9 @@ TEST(OpenSource, NamesTheCommandThatConvertsARasterOfAnotherProgram) {
   };
   const Row rows[] = {
       {"a.dem", std::string(144, ' ') + "     1     1     1    12", "a USGS DEM"},
+      {"text.grd", "DSAA\n4 3\n", "a Surfer grid"},
+      {"six.grd", "DSBB", "a Surfer grid"},
+      {"seven.grd", "DSRB", "a Surfer grid"},
       {"a.img", "EHFA_HEADER_TAG", "an ERDAS Imagine raster"},
   };
   for (const Row& row : rows) {
@@ -227,8 +230,7 @@ TEST(Formats, AreListedWithTheLibraryThatReadsThem) {
     for (const std::string extension : format.extensions) {
       const bool first = extensions.insert(extension).second;
       // Of these the content tells which format it is.
-      EXPECT_TRUE(first || extension == ".img" || extension == ".lbl" || extension == ".dem" || extension == ".hdr" ||
-                  extension == ".grd")
+      EXPECT_TRUE(first || extension == ".img" || extension == ".lbl" || extension == ".dem" || extension == ".hdr")
           << extension << " is listed twice";
     }
   }

@@ -86,7 +86,6 @@ class Maker:
         self.add("ESRI ASCII grid, whole numbers", "whole.asc", self.text, "-of", "AAIGrid")
         self.add("ESRI ASCII grid, fractions", "fractions.asc", self.text, "-of", "AAIGrid", "-co", "DECIMAL_PRECISION=3",
                  *FRACTIONS)
-        self.add("Surfer text grid", "text.grd", self.text, "-of", "GSAG", *FRACTIONS)
         self.add("DTED", "n45_e006.dt1" if side == 1201 else "n45_e006.dt2", self.degree, "-of", "DTED", *posts)
         self.add("SRTM HGT", "N45E006.hgt", self.degree, "-of", "SRTMHGT", *posts)
 
@@ -104,8 +103,6 @@ class Maker:
 
     def plain(self):
         self.add("GridFloat", "floats.flt", self.floats, "-of", "EHdr", *FRACTIONS)
-        self.add("Surfer 6 grid", "six.grd", self.floats, "-of", "GSBG", *FRACTIONS)
-        self.add("Surfer 7 grid", "seven.grd", self.floats, "-of", "GS7BG", *FRACTIONS)
         self.add("EHdr .bil", "land.bil", self.integers, "-of", "EHdr")
         self.add("ISIS3 cube", "land.cub", self.integers, "-of", "ISIS3")
         samples = self.gdal("samples.bin", self.integers, "-of", "ENVI")

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "formats/files/zip_archive.h"
+#include "formats/grids/netcdf_bytes.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -84,9 +85,15 @@ TEST_F(SilentFailures, DiffNamesAMemberThatOneArchiveAloneHas) {
   EXPECT_THAT(run({"diff", "b.isohf", "b.isohf"}).out, Not(HasSubstr("note.txt")));
 }
 
-TEST_F(SilentFailures, BlankedNodesOfASurferGridAreVoidInWhatRestoreWrites) {
-  write_file(folder / "a.grd", "DSAA\n3 3\n0 20\n0 20\n1 9\n1 2 3\n4 1.70141e+38 6\n7 8 9\n");
-  run({"convert", "a.grd", "a.isohf", "--lossless", "-q"});
+TEST_F(SilentFailures, VoidsBeyondTheValidRangeAreVoidInWhatRestoreWrites) {
+  std::string samples;
+  for (const int value : {1, 2, 3, 4, 32767, 6, 7, 8, 9})
+    samples += {static_cast<char>(value >> 8), static_cast<char>(value)};
+  NetcdfBytes file;
+  file.dimension("y", 3).dimension("x", 3);
+  file.variable("z", {0, 1}, 3, samples, {}, {{"_FillValue", {32767.0}}, {"valid_max", {9000.0}}});
+  write_file(folder / "a.nc", file.bytes());
+  run({"convert", "a.nc", "a.isohf", "--lossless", "-q"});
   const RunResult restored = run({"restore", "a.isohf", "a.tif"});
   EXPECT_EQ(restored.err, "");
   EXPECT_THAT(run({"info", "a.tif", "--stats"}).out, HasSubstr("1 of them void"));
