@@ -89,14 +89,8 @@ namespace isohf {
 [[nodiscard]] bool has_envi_header(const std::string& path);
 [[nodiscard]] std::unique_ptr<HeightSource> open_envi(const std::string& path, const OpenOptions& options);
 
-/// A SAGA grid: samples (.sdat) and their header (.sgrd), of which either is `path`, usually from South to North; cells
-/// are areas. A .prj beside is read.
-[[nodiscard]] std::unique_ptr<HeightSource> open_saga(const std::string& path, const OpenOptions& options);
-
-/// IDRISI's samples (.rst) and their documentation (.rdc), of which either is `path`; ROI_PAC's NAME.dem beside
-/// NAME.dem.rsc; a band of a VICAR file, placed by its property MAP; Terragen's heightfield, whose rows begin in the South; a binary graymap
-/// (Netpbm's P5) of 8 or 16 bits, its numbers as stored.
-[[nodiscard]] std::unique_ptr<HeightSource> open_idrisi(const std::string& path, const OpenOptions& options);
+/// ROI_PAC's NAME.dem beside NAME.dem.rsc; a band of a VICAR file, placed by its property MAP; Terragen's heightfield, whose
+/// rows begin in the South; a binary graymap (Netpbm's P5) of 8 or 16 bits, its numbers as stored.
 [[nodiscard]] std::unique_ptr<HeightSource> open_roi_pac(const std::string& path, const OpenOptions& options);
 [[nodiscard]] bool looks_like_vicar(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_vicar(const std::string& path, const OpenOptions& options);

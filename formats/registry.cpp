@@ -55,8 +55,6 @@ const std::vector<Reader>& readers() {
        true},
       {{"netCDF-4", {".nc4"}, netcdf_library, "takes `channel`"}, looks_like_hdf5, open_netcdf4},
       {{"ENVI", {".hdr"}, nullptr, "takes `channel`"}, looks_like_envi, open_envi, has_envi_header},
-      {{"SAGA grid", {".sdat", ".sgrd"}}, nullptr, open_saga},
-      {{"IDRISI", {".rst", ".rdc"}}, nullptr, open_idrisi},
       {{"VICAR", {".vic", ".vicar"}, nullptr, "takes `channel`"}, looks_like_vicar, open_vicar, nullptr, true},
       {{"Terragen", {".ter"}}, looks_like_terragen, open_terragen, nullptr, true},
       {{"Portable graymap", {".pgm"}}, looks_like_graymap, open_graymap, nullptr, true},

@@ -34,7 +34,7 @@ using HeaderWords = std::map<std::string, std::string, std::less<>>;
 /// The items of a list, "{a, b}" or "a, b", without the blanks around them.
 [[nodiscard]] std::vector<std::string> list_of(std::string_view text);
 
-/// Plain samples that something else describes: ENVI's header, SAGA's, PDS4's label and so on. Whoever derives from this
+/// Plain samples that something else describes: ENVI's header, PDS4's label and so on. Whoever derives from this
 /// reads the description into info_ and layout_ and calls finish().
 class DescribedSource : public PlainSource {
  protected:

@@ -1,4 +1,4 @@
-/// More plain samples with a header: IDRISI's .rdc, ROI_PAC's .rsc, the labels of VICAR, Terragen's chunks, and the
+/// More plain samples with a header: ROI_PAC's .rsc, the labels of VICAR, Terragen's chunks, and the
 /// numbers of a Netpbm graymap.
 
 #include <fmt/core.h>
@@ -29,167 +29,6 @@
 
 namespace isohf {
 namespace {
-
-class IdrisiSource final : public DescribedSource {
- public:
-  IdrisiSource(const std::string& data, const std::string& header, const OpenOptions& options)
-      : DescribedSource(data, "IDRISI", header, options) {
-    (void)choose_band(info_, options, 1);
-    const HeaderWords words = read_header_words(header, ':');
-    set_size(number(words, "columns"), number(words, "rows"));
-    static constexpr std::array<std::pair<std::string_view, SampleType>, 3> kTypes = {
-        {{"byte", SampleType::kUint8}, {"integer", SampleType::kInt16}, {"real", SampleType::kFloat32}}};
-    if (const std::string kind = word_in(words, "file type"); kind != "binary") {
-      refuse(kind.empty() ? ErrorCode::kCorrupt : ErrorCode::kUnsupported,
-             fmt::format("file type is \"{}\", must be binary", printable(kind)));
-    }
-    set_type(kTypes, word_in(words, "data type"), "data type");
-    const double west = number(words, "min. x");
-    const double north = number(words, "max. y");
-    place_by_corner(west, north, (number(words, "max. x") - west) / static_cast<double>(info_.width),
-                    (north - number(words, "min. y")) / static_cast<double>(info_.height));
-    read_system(words);
-    const std::string flag = word_in(words, "flag value");
-    if (!flag.empty() && flag != "none") set_void(number(flag, "flag value"));
-    if (const auto unit = linear_unit(word_in(words, "value units"))) {
-      info_.vertical_unit = unit->name;
-      info_.metres_per_vertical_unit = unit->metres;
-    }
-    finish(options);
-  }
-
- private:
-  void read_system(const HeaderWords& words) {
-    Georeference& place = info_.georeference;
-    const std::string system = word_in(words, "ref. system");
-    const std::string unit = word_in(words, "ref. units");
-    int zone = 0;
-    char half = 'n';
-    if (unit == "deg" || unit == "degrees" || system == "latlong") {
-      place.unit = HorizontalUnit::kDegree;
-    } else if (const auto length = linear_unit(unit)) {
-      place.unit = HorizontalUnit::kMetre;
-      place.metres_per_unit = length->metres * number(words, "unit dist.", 1.0);
-    }
-    if (system == "latlong") {
-      place.system = wgs84_system();
-    } else if (std::sscanf(system.c_str(), "utm-%d%c", &zone, &half) == 2 && zone >= 1 && zone <= 60) {
-      place.system = wgs84_utm_zone(zone, half == 's');
-    } else if (!system.empty() && system != "plane" && !read_parameters(file_beside(header_, system + ".ref")) &&
-               !read_state_plane(system)) {
-      leave_out_system("reference system", system);
-    }
-  }
-
-  /// "spc83ca1": NAD83 or NAD27, the state, its zone. EPSG's conversions have the numbers of the zones in them; false
-  /// where there is none of that number, several systems are meant, or PROJ is not there.
-  bool read_state_plane(const std::string& name) {
-    int year = 0;
-    int zone = 0;
-    int read = 0;
-    std::array<char, 3> state{};
-    if (std::sscanf(name.c_str(), "spc%2d%2[a-z]%1d%n", &year, state.data(), &zone, &read) != 3 ||
-        static_cast<std::size_t>(read) != name.size() || (year != 27 && year != 83)) {
-      return false;
-    }
-    // State Plane Coordinate System of 1983 (NOAA NOS NGS 5), appendix A: numbers of zones are these and two digits.
-    static constexpr std::string_view kStates =
-        "al01az02ar03ca04co05ct06de07fl09ga10id11il12in13ia14ks15ky16la17me18md19ma20mi21mn22ms23mo24mt25ne26nv27nh28"
-        "nj29nm30ny31nc32nd33oh34ok35or36pa37ri38sc39sd40tn41tx42ut43vt44va45wa46wv47wi48wy49ak50hi51pr52";
-    std::size_t at = 0;
-    while (at < kStates.size() && kStates.substr(at, 2) != state.data()) at += 4;
-    if (at == kStates.size()) return false;
-    const int number = 10 * (kStates[at + 2] - '0') + kStates[at + 3] - '0';
-    // A state of one zone has it under 0. IDRISI's feet are those that EPSG has a system of the zone in: the state's.
-    struct Unit {
-      int axes;  ///< EPSG's
-      double metres;
-    };
-    constexpr std::array<Unit, 3> kUnits = {{{4499, 1.0}, {4497, 1200.0 / 3937.0}, {4495, 0.3048}}};
-    const bool in_metres = info_.georeference.metres_per_unit == 1.0;
-    for (const Unit& unit : kUnits) {
-      if (in_metres != (unit.metres == 1.0)) continue;
-      for (const int each : {zone, 0}) {
-        if (each == 0 && zone > 1) continue;
-        SourceInfo found = info_;
-        found.georeference.metres_per_unit = unit.metres;
-        try {
-          take_system(
-              fmt::format("urn:ogc:def:crs,crs:EPSG::{},cs:EPSG::{},coordinateOperation:EPSG::{}",
-                          year == 83 ? 4269 : 4267, unit.axes, 10000 + 100 * number + each + (year == 83 ? 30 : 0)),
-              found);
-        } catch (const Error&) {  // no such zone
-          continue;
-        }
-        if (!found.georeference.system.epsg) continue;
-        info_ = found;
-        return true;
-      }
-    }
-    return false;
-  }
-
-  /// A reference system parameter file (.ref); false where it is not there or has a projection that is not known.
-  bool read_parameters(const std::string& path) {
-    if (path.empty()) return false;
-    const HeaderWords words = read_header_words(path, ':');
-    static constexpr std::array<std::pair<std::string_view, std::string_view>, 12> kMethods = {
-        {{"cylindrical equal area", "Cylindrical_Equal_Area"},
-         {"azimuthal equal area", "Lambert_Azimuthal_Equal_Area"},
-         {"polar stereographic", "Polar_Stereographic"},
-         {"oblique stereographic", "Oblique_Stereographic"},
-         {"transverse stereographic", "Stereographic"},
-         {"transverse mercator", "Transverse_Mercator"},
-         {"gauss-kruger", "Transverse_Mercator"},
-         {"mercator", "Mercator_1SP"},
-         {"lambert conformal conic", "Lambert_Conformal_Conic_2SP"},
-         {"alber's equal area conic", "Albers_Conic_Equal_Area"},
-         {"plate carr", "Equirectangular"},
-         {"sinusoidal", "Sinusoidal"}}};
-    const std::string projection = word_in(words, "projection");
-    const auto* const method = std::ranges::find_if(
-        kMethods, [&](const auto& known) { return projection.find(known.first) != std::string::npos; });
-    const bool is_map = projection != "none";
-    if (is_map ? method == kMethods.end() : !word_in(words, "units").starts_with("deg")) return false;
-    const double a = number(words, "major s-ax");
-    const double b = number(words, "minor s-ax");
-    if (!(a > 0.0 && b > 0.0)) refuse(ErrorCode::kCorrupt, path + " gives axes of no ellipsoid");
-    const auto name = [&](const char* key) {
-      const auto found = words.find(key);
-      return found == words.end() ? std::string("unknown") : found->second;
-    };
-    const double flattening = std::abs(a - b) < kAxisRounding ? 0.0 : a / (a - b);
-    const std::string geographic = geographic_wkt(is_map ? "unknown" : name("datum"), name("datum"), name("ellipsoid"),
-                                                  a, known_flattening(name("ellipsoid"), flattening));
-    const double scale = number(words, "scale fac", 1.0);
-    const MapParameters parameters{number(words, "origin lat", 0.0),
-                                   number(words, "origin long", 0.0),
-                                   number(words, "stand ln 1", 0.0),
-                                   number(words, "stand ln 2", 0.0),
-                                   scale == 0.0 ? 1.0 : scale,
-                                   0.0,
-                                   0.0,
-                                   number(words, "origin x", 0.0),
-                                   number(words, "origin y", 0.0)};
-    const double metres_per_unit =
-        std::exchange(info_.georeference.metres_per_unit, 1.0);  // the text's own unit counts
-    read_system_text(
-        is_map ? map_wkt(name("ref. system"), geographic, method->second, parameters, metres_per_unit) : geographic,
-        path, info_);
-    return true;
-  }
-
-  /// Axes are written to millimetres: the flattening that is meant, where WGS 84 and GRS 1980 differ by name alone.
-  static double known_flattening(const std::string& ellipsoid, double computed) {
-    constexpr double kMillimetre = 1e-4;
-    if (ellipsoid == "GRS 1980" && std::abs(computed - 298.257222101) < kMillimetre) return 298.257222101;
-    for (const double known : {298.257223563, 299.1528128, 297.0, 294.978698213898, 298.3, 293.465, 300.8017, 298.25}) {
-      if (std::abs(computed - known) < kMillimetre) return known;
-    }
-    return computed;
-  }
-  static constexpr double kAxisRounding = 0.0015;
-};
 
 /// An interferometric DEM: NAME.dem of int16, and NAME.dem.rsc.
 class RoiPacSource final : public DescribedSource {
@@ -438,11 +277,6 @@ class GraymapSource final : public DescribedSource {
 };
 
 }  // namespace
-
-std::unique_ptr<HeightSource> open_idrisi(const std::string& path, const OpenOptions& options) {
-  const auto [data, header] = data_and_header(path, ".rst", ".rdc");
-  return std::make_unique<IdrisiSource>(data, header, options);
-}
 
 std::unique_ptr<HeightSource> open_roi_pac(const std::string& path, const OpenOptions& options) {
   return std::make_unique<RoiPacSource>(path, path + ".rsc", options);

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 #include <fstream>
 #include <string_view>
 #include <utility>
 
 #include "formats/files/text.h"
+#include "formats/georeference/files_beside.h"
 
 namespace isohf {
 namespace {
@@ -25,6 +27,23 @@ struct Raster {
   bool (*found)(const std::string& path, std::string_view head);
   const char* help = kGdal;
 };
+
+bool has_extension(const std::string& path, std::string_view extension) {
+  return lower_case(path).ends_with(extension);
+}
+
+/// Whether the file of another extension lies beside it.
+bool has_beside(const std::string& path, const char* extension) {
+  return !file_beside(path, std::filesystem::path(path).filename().replace_extension(extension).string()).empty();
+}
+
+/// The file of samples that a header describes; `path` for any other file.
+std::string samples_of(const std::string& path) {
+  for (const auto& [header, samples] : {std::pair(".sgrd", ".sdat"), {".rdc", ".rst"}}) {
+    if (has_extension(path, header)) return std::filesystem::path(path).replace_extension(samples).string();
+  }
+  return path;
+}
 
 /// Whether text begins a record of type A (USGS, Standards for Digital Elevation Models, part 2): codes in columns of six.
 bool is_usgs_dem(std::string_view head) {
@@ -48,6 +67,12 @@ bool is_usgs_dem(std::string_view head) {
 constexpr Raster kRasters[] = {
     {"an ERDAS Imagine raster",
      [](const std::string&, std::string_view head) { return head.starts_with("EHFA_HEADER_TAG"); }},
+    {"a SAGA grid", [](const std::string& path,
+                       std::string_view) { return has_extension(path, ".sdat") || has_extension(path, ".sgrd"); }},
+    {"an IDRISI raster",
+     [](const std::string& path, std::string_view) {
+       return has_extension(path, ".rdc") || (has_extension(path, ".rst") && has_beside(path, ".rdc"));
+     }},
     {"a Surfer grid",
      [](const std::string&, std::string_view head) {
        return head.starts_with("DSAA") || head.starts_with("DSBB") || head.starts_with("DSRB");
@@ -119,7 +144,7 @@ ForeignFile foreign_file(const std::string& path) {
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(file.gcount()));
   if (const Raster* const raster = raster_of(path, head)) {
-    return {raster->is, fmt::format(fmt::runtime(raster->help), path)};
+    return {raster->is, fmt::format(fmt::runtime(raster->help), samples_of(path))};
   }
   for (const Signature& signature : kSignatures) {
     if (head.size() < signature.at || !std::string_view(head).substr(signature.at).starts_with(signature.bytes))

@@ -185,7 +185,7 @@ std::optional<std::vector<Member>> members_of(const RawFile& file) {
 bool is_raster(const Member& member) {
   const std::string name = lower_case(member.file_name());
   if (name.empty() || name.front() == '.') return false;
-  for (const char* other : {".hdr", ".lbl", ".lblx", ".sgrd", ".rdc", ".vrt", ".zip", ".tar", ".tgz"}) {
+  for (const char* other : {".hdr", ".lbl", ".lblx", ".vrt", ".zip", ".tar", ".tgz"}) {
     if (name.ends_with(other)) return false;
   }
   return std::ranges::any_of(native_formats(), [&](const Format& format) {

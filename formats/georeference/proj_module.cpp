@@ -226,22 +226,6 @@ void describe(IsohfProjSystem& system, IsohfProjInfo& info) {
   }
 }
 
-/// The system of EPSG's that a nameless one is, put together out of parts of EPSG's; null where none or several are.
-Object as_named(PJ_CONTEXT* context, const PJ* system) {
-  int* confidence = nullptr;
-  const std::unique_ptr<PJ_OBJ_LIST, Destroy<proj_list_destroy>> list(
-      proj_identify(context, system, "EPSG", nullptr, &confidence));
-  proj_int_list_destroy(confidence);
-  Object named;
-  for (int i = 0; list && i < proj_list_get_count(list.get()); ++i) {
-    Object each(proj_list_get(context, list.get(), i));
-    if (proj_is_equivalent_to_with_ctx(context, system, each.get(), PJ_COMP_EQUIVALENT) == 0) continue;
-    if (named) return nullptr;
-    named = std::move(each);
-  }
-  return named;
-}
-
 /// PROJ takes any word for the first name in which it finds it: "foo" for "Amersfoort".
 void check_name(const std::string& text, const char* found) {
   if (text.find_first_of(":[{+=") != std::string::npos) return;
@@ -271,12 +255,6 @@ void open(const std::string& text, const char* heights, IsohfProjSystem& system,
   }
   check_name(text, proj_get_name(system.system.get()));
   system.horizontal = horizontal_part(context, system.system.get());
-  if (text.starts_with("urn:ogc:def:crs,") && proj_get_id_code(system.horizontal.get(), 0) == nullptr) {
-    if (Object named = as_named(context, system.system.get())) {
-      system.horizontal.reset(proj_clone(context, named.get()));
-      system.system = std::move(named);
-    }
-  }
   if (*heights != '\0' && proj_get_type(system.system.get()) != PJ_TYPE_COMPOUND_CRS) {
     const Object vertical(proj_create(context, heights));
     const std::string name =

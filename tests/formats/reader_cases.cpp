@@ -207,20 +207,6 @@ constexpr const char* kVrt =
 constexpr const char* kEnvi =
     "ENVI\nsamples = 4\nlines = 3\nbands = 2\nheader offset = 2\ndata type = 2\ninterleave = bip\nbyte order = 1\n"
     "map info = {UTM, 1, 1, 500000, 4000000, 30, 30, 32, North, WGS-84}\ndata ignore value = 5\n";
-constexpr const char* kSaga =
-    "NAME = a\nDATAFORMAT = SHORTINT\nDATAFILE_OFFSET = 2\nBYTEORDER_BIG = FALSE\nPOSITION_XMIN = 5\nPOSITION_YMIN = "
-    "7\n"
-    "CELLCOUNT_X = 4\nCELLCOUNT_Y = 3\nCELLSIZE = 10\nZ_FACTOR = 0.5\nNODATA_VALUE = 5\nTOPTOBOTTOM = FALSE\n";
-
-constexpr const char* kIdrisiParameters =
-    "ref. system : own\nprojection : Lambert Conformal Conic\ndatum : ETRS89\nellipsoid : GRS 1980\nmajor s-ax : "
-    "6378137.000\nminor s-ax : 6356752.314\norigin long : 10\norigin lat : 52\norigin X : 4321000\norigin Y : 3210000\n"
-    "stand ln 1 : 35\nstand ln 2 : 65\nscale fac : 1\nunits : m\n";
-
-constexpr const char* kIdrisi =
-    "file format : Idrisi Raster A.1\ndata type   : integer\nfile type   : binary\ncolumns     : 4\nrows        : 3\n"
-    "ref. system : utm-33n\nref. units  : m\nunit dist.  : 1\nmin. X      : 10\nmax. X      : 50\nmin. Y      : 0\n"
-    "max. Y      : 30\nflag value  : 5\n";
 constexpr const char* kRoiPac =
     "WIDTH 4\nFILE_LENGTH 3\nX_FIRST 10\nX_STEP 0.5\nY_FIRST 50\nY_STEP -0.5\nPROJECTION LATLON\nDATUM WGS84\n";
 
@@ -281,13 +267,8 @@ std::vector<ReaderCase> reader_cases() {
       {"Vrt", "a.vrt", kVrt, open_vrt, {}},
       {"EnviHeader", "a.hdr", kEnvi, open_envi, {}},
       {"EnviSamples", "a.dat", "  " + counting(24, 2), open_envi, {}},
-      {"SagaHeader", "a.sgrd", kSaga, open_saga, {}},
-      {"SagaSamples", "a.sdat", "  " + counting(12, 2), open_saga, {}},
       {"NetcdfClassic", "a.nc", netcdf(), open_netcdf, {}},
       {"NetcdfByColumns", "a.nc", netcdf(true), open_netcdf, {}},
-      {"IdrisiHeader", "a.rdc", kIdrisi, open_idrisi, {}},
-      {"IdrisiSamples", "a.rst", counting(12, 2), open_idrisi, {}},
-      {"IdrisiParameters", "own.ref", kIdrisiParameters, open_idrisi, {}},
       {"RoiPacHeader", "a.dem.rsc", kRoiPac, open_roi_pac, {}},
       {"Vicar", "a.vic", vicar(), open_vicar, {}},
       {"Terragen", "a.ter", terragen(), open_terragen, {}},
@@ -327,17 +308,12 @@ std::vector<ReaderCase> reader_cases() {
     if (each.name == "EhdrHeader") each.beside.pop_back();
   }
   find("Vrt").beside = {{"a.npy", npy()}};
-  for (const auto& [header, samples, text] : {std::tuple("EnviHeader", "EnviSamples", kEnvi),
-                                              {"SagaHeader", "SagaSamples", kSaga},
-                                              {"IdrisiHeader", "IdrisiSamples", kIdrisi}}) {
-    ReaderCase& damaged = find(header);
-    ReaderCase& whole = find(samples);
-    damaged.text = true;
-    damaged.shortest_valid = 1;  // what is left out is taken for granted, or asked for
-    damaged.opened = whole.file_name;
-    damaged.beside = {{whole.file_name, whole.bytes}};
-    whole.beside = {{damaged.file_name, text}};
-  }
+  ReaderCase& header = find("EnviHeader");
+  header.text = true;
+  header.shortest_valid = 1;  // what is left out is taken for granted, or asked for
+  header.opened = find("EnviSamples").file_name;
+  header.beside = {{header.opened, find("EnviSamples").bytes}};
+  find("EnviSamples").beside = {{header.file_name, kEnvi}};
   find("Pds4Label").beside = {{"a.dat", counting(7, 2)}};
   find("Pds4Label").shortest_valid = find("Pds4Label").bytes.size() - 1;
   find("Pds4Samples").beside = {{"a.xml", pds4_label("a.dat")}};
@@ -370,13 +346,6 @@ std::vector<ReaderCase> reader_cases() {
   roi_pac.shortest_valid = 1;
   roi_pac.opened = "a.dem";
   roi_pac.beside = {{"a.dem", counting(12, 2)}};
-  ReaderCase& parameters = find("IdrisiParameters");
-  parameters.text = true;
-  parameters.shortest_valid = 1;
-  parameters.opened = "a.rst";
-  parameters.beside = {{"a.rst", counting(12, 2)}, {"a.rdc", kIdrisi}};
-  std::string& header = parameters.beside.back().second;
-  header.replace(header.find("utm-33n"), std::string("utm-33n").size(), "own");
   find("Vicar").shortest_valid = find("Vicar").bytes.size() - 20;  // the other band's, and its prefix
   find("XyzText").shortest_valid = find("XyzText").bytes.size() - 1;
   find("PngDescription").shortest_valid = find("PngDescription").bytes.size() - 1;

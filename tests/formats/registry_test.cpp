@@ -174,10 +174,15 @@ TEST(OpenSource, NamesTheCommandThatConvertsARasterOfAnotherProgram) {
     std::string bytes;
     std::string says;  ///< after the path, up to the command
     std::string command = "gdal_translate";
-    std::string beside = {};  ///< another file that is there
+    std::string beside = {};     ///< another file that is there
+    std::string converted = {};  ///< the file that the command names, if another
   };
   const Row rows[] = {
       {"a.dem", std::string(144, ' ') + "     1     1     1    12", "a USGS DEM"},
+      {"a.sdat", "12", "a SAGA grid"},
+      {"a.sgrd", "NAME = a\n", "a SAGA grid", "gdal_translate", "", "a.sdat"},
+      {"a.rst", "12", "an IDRISI raster", "gdal_translate", "a.rdc"},
+      {"a.rdc", "columns : 1\n", "an IDRISI raster", "gdal_translate", "", "a.rst"},
       {"text.grd", "DSAA\n4 3\n", "a Surfer grid"},
       {"six.grd", "DSBB", "a Surfer grid"},
       {"seven.grd", "DSRB", "a Surfer grid"},
@@ -192,7 +197,8 @@ TEST(OpenSource, NamesTheCommandThatConvertsARasterOfAnotherProgram) {
     EXPECT_EQ(native_format_of(path, {}), nullptr);
     const Error error = refusal(path);
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
-    EXPECT_THAT(error.what(), HasSubstr(path + ": this is " + row.says + "; " + row.command + ' ' + path));
+    EXPECT_THAT(error.what(), HasSubstr(path + ": this is " + row.says + "; " + row.command + ' ' +
+                                        (folder / (row.converted.empty() ? row.name : row.converted))));
   }
   EXPECT_FALSE(is_loaded({"libgdal", "OpenImageIO", "isohf_oiio"}));
   set_module_folder("");

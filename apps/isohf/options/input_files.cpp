@@ -34,7 +34,7 @@ const std::set<std::string>& raster_extensions() {
   static const std::set<std::string> known = [] {
     std::set<std::string> list;
     for (const Format& format : native_formats()) list.insert(format.extensions.begin(), format.extensions.end());
-    for (const char* other : {".hdr", ".rdc", ".sgrd", ".vrt"}) list.erase(other);  // beside rasters, or of them
+    for (const char* other : {".hdr", ".vrt"}) list.erase(other);  // beside rasters, or of them
     return list;
   }();
   return known;

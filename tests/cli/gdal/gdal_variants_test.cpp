@@ -215,10 +215,10 @@ TEST_F(GdalVariants, WhatGdalKeepsBesideSaysWhatSamplesMean) {
     for (const char* more : {"-a_scale", "0.1", "-a_offset", "800"}) options.emplace_back(more);
     return Variant{name, options};
   };
-  for (const Variant& variant : {scaled("a.asc", {"-of", "AAIGrid", "-a_nodata", "-9999"}),
-                                 scaled("b.bil", {"-of", "EHdr", "-a_nodata", "7"}), scaled("c.sdat", {"-of", "SAGA"}),
-                                 scaled("e.rst", {"-of", "RST"}), scaled("f.dem", {"-of", "ROI_PAC", "-a_nodata", "7"}),
-                                 scaled("g.dat", {"-of", "ENVI"}), scaled("h.xyz", {"-of", "XYZ"})}) {
+  for (const Variant& variant :
+       {scaled("a.asc", {"-of", "AAIGrid", "-a_nodata", "-9999"}), scaled("b.bil", {"-of", "EHdr", "-a_nodata", "7"}),
+        scaled("f.dem", {"-of", "ROI_PAC", "-a_nodata", "7"}), scaled("g.dat", {"-of", "ENVI"}),
+        scaled("h.xyz", {"-of", "XYZ"})}) {
     expect_same("whole.tif", variant);
   }
 }
@@ -229,9 +229,7 @@ TEST_F(GdalVariants, SamplesThatAHeaderDescribes) {
                             {"b.dat", {"-of", "ENVI", "-co", "INTERLEAVE=BIP", "-a_nodata", "0"}},
                             {"c.bil", {"-of", "ENVI", "-co", "SUFFIX=ADD", "-ot", "UInt16"}},
                             {"south.bin", {"-of", "ENVI", "-a_ullr", "10", "49", "11", "50", "-a_srs", "EPSG:4326"}},
-                            {"d.sdat", {"-of", "SAGA"}},
                             {"e.nc", {"-of", "netCDF"}},
-                            {"k.rst", {"-of", "RST"}},
                             {"l.dem", {"-of", "ROI_PAC"}},
                             {"i.xyz", {"-of", "XYZ"}},
                             {"j.xyz", {"-of", "XYZ", "-co", "COLUMN_SEPARATOR=,", "-co", "ADD_HEADER_LINE=YES"}},
@@ -241,7 +239,6 @@ TEST_F(GdalVariants, SamplesThatAHeaderDescribes) {
     expect_same("whole.tif", variant);
   }
   for (const Variant& variant : std::vector<Variant>{{"r.img", {"-of", "ENVI", "-ot", "Float64"}},
-                                                     {"s.sdat", {"-of", "SAGA"}},
                                                      {"u.xml", {"-of", "PDS4", "-ot", "Float64"}},
                                                      {"t.nc", {"-of", "netCDF", "-co", "WRITE_BOTTOMUP=NO"}}}) {
     expect_same("real.tif", variant);

@@ -637,24 +637,6 @@ def ellipsoidal(isohf, folder):
     check("heights above the ellipsoid" in isohf.must("info", folder / "e.isohf").stdout, "--crs EPSG:4979: no heights above the ellipsoid")
 
 
-def ranges_of_voids(isohf, folder):
-    """SAGA's NODATA_VALUE may be a range, of which every value is void."""
-    grid = numpy.arange(1600, dtype="<f4").reshape(40, 40)
-    grid[2, 3:7] = (-99999.0, -50000.25, -9999.0, -9998.0)
-    (folder / "s.sdat").write_bytes(grid.tobytes())
-    for text, voids in (("-99999;-9999", 3), ("-9999;-99999", 3), ("-9999", 1), ("-60000;-9999", 2)):
-        (folder / "s.sgrd").write_text(f"DATAFORMAT\t= FLOAT\nBYTEORDER_BIG\t= FALSE\nTOPTOBOTTOM\t= TRUE\nPOSITION_XMIN\t= 0\n"
-                                       f"POSITION_YMIN\t= 0\nCELLCOUNT_X\t= 40\nCELLCOUNT_Y\t= 40\nCELLSIZE\t= 10\n"
-                                       f"NODATA_VALUE\t= {text}\n")
-        isohf.must("convert", folder / "s.sgrd", "-o", folder / "s.isohf", "--overwrite", "--lossless", "-q")
-        isohf.must("restore", folder / "s.isohf", folder / "s.tif", "--overwrite", "-q")
-        raster = gdal.Open(str(folder / "s.tif"))
-        band = raster.GetRasterBand(1)
-        found = band.ReadAsArray()
-        count = int(((found == band.GetNoDataValue()) | numpy.isnan(found)).sum())
-        check(count == voids, f"NODATA_VALUE {text}: {count} voids, must be {voids}")
-
-
 def large_chunks(isohf, folder):
     """What is looked at in a netCDF-4 file before it is read decodes no chunk of a gigabyte."""
     path = folder / "c.nc"
@@ -800,7 +782,7 @@ made.Write(numpy.zeros((12000, 12000), dtype=numpy.float32))
 
 
 PARTS = (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
-         samples, geojp2, jpeg2000, turns, same_for_gdal, bounds_of_labels, pages, numbers_of_no_unit, vicar, ellipsoidal, ranges_of_voids, large_chunks, feet, voids_of_files, beside_samples, rotated)
+         samples, geojp2, jpeg2000, turns, same_for_gdal, bounds_of_labels, pages, numbers_of_no_unit, vicar, ellipsoidal, large_chunks, feet, voids_of_files, beside_samples, rotated)
 
 if __name__ == "__main__":
     sys.exit(run_parts(PARTS, __doc__))

@@ -19,10 +19,10 @@ constexpr const char* kAuxiliary =
 
 TEST(FilesBeside, GdalsSaysWhatTheSamplesOfEveryGridMeanBesideAPrjToo) {
   set_module_folder(ISOHF_BIN_DIR);
-  constexpr std::array kGrids = {
-      "EsriAsciiGrid", "GrassAsciiGrid", "EhdrHeader",   "EhdrProjection", "GridFloatSamples", "Dted",    "Hgt",
-      "EnviHeader",    "SagaHeader",     "IdrisiHeader", "RoiPacHeader",   "XyzText",          "Graymap", "Npy",
-      "TiffTagsFirst", "TiffTiles",      "PngGray16"};
+  constexpr std::array kGrids = {"EsriAsciiGrid",    "GrassAsciiGrid", "EhdrHeader", "EhdrProjection",
+                                 "GridFloatSamples", "Dted",           "Hgt",        "EnviHeader",
+                                 "RoiPacHeader",     "XyzText",        "Graymap",    "Npy",
+                                 "TiffTagsFirst",    "TiffTiles",      "PngGray16"};
   std::size_t tried = 0;
   for (const ReaderCase& each : reader_cases()) {
     if (std::ranges::count(kGrids, each.name) == 0) continue;
