@@ -89,16 +89,6 @@ namespace isohf {
 [[nodiscard]] bool has_envi_header(const std::string& path);
 [[nodiscard]] std::unique_ptr<HeightSource> open_envi(const std::string& path, const OpenOptions& options);
 
-/// ROI_PAC's NAME.dem beside NAME.dem.rsc; a band of a VICAR file, placed by its property MAP; Terragen's heightfield, whose
-/// rows begin in the South; a binary graymap (Netpbm's P5) of 8 or 16 bits, its numbers as stored.
-[[nodiscard]] std::unique_ptr<HeightSource> open_roi_pac(const std::string& path, const OpenOptions& options);
-[[nodiscard]] bool looks_like_vicar(std::span<const std::byte> head);
-[[nodiscard]] std::unique_ptr<HeightSource> open_vicar(const std::string& path, const OpenOptions& options);
-[[nodiscard]] bool looks_like_terragen(std::span<const std::byte> head);
-[[nodiscard]] std::unique_ptr<HeightSource> open_terragen(const std::string& path, const OpenOptions& options);
-[[nodiscard]] bool looks_like_graymap(std::span<const std::byte> head);
-[[nodiscard]] std::unique_ptr<HeightSource> open_graymap(const std::string& path, const OpenOptions& options);
-
 /// A variable of two dimensions (those before of one value, columns first or last) in a netCDF file of the classic
 /// formats, which options.channel names, else the first; coordinates that are evenly spaced place it, "crs_wkt" or
 /// "spatial_ref" of its grid mapping say where, degrees without one are on WGS 84. Also GMT's grids of before CF. _FillValue and missing_value

@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <cmath>
-#include <filesystem>
 
 #include "formats/files/text.h"
 #include "formats/files/text_tokens.h"
@@ -19,20 +18,6 @@ constexpr std::uint64_t kLongestDescription = std::uint64_t{1} << 20U;
 
 }  // namespace
 
-std::string word_in(const HeaderWords& words, std::string_view key) {
-  const auto found = words.find(key);
-  return found == words.end() ? std::string() : lower_case(found->second);
-}
-
-std::pair<std::string, std::string> data_and_header(const std::string& path, const char* data_extension,
-                                                    const char* header_extension) {
-  const bool is_data = lower_case(path).ends_with(data_extension);
-  const auto name = std::filesystem::path(path).replace_extension(is_data ? header_extension : data_extension);
-  const std::string other = file_beside(path, name.filename().string());
-  if (other.empty()) throw Error(ErrorCode::kIo, fmt::format("{}: {} must be beside it", path, name.string()));
-  return is_data ? std::pair(path, other) : std::pair(other, path);
-}
-
 std::string read_header_text(const std::string& path) {
   const RawFile file(path);
   if (file.size_bytes() > kLongestDescription) {
@@ -44,13 +29,12 @@ std::string read_header_text(const std::string& path) {
   return text;
 }
 
-HeaderWords read_header_words(const std::string& path, char separator) {
+HeaderWords read_header_words(const std::string& path) {
   const std::string text = read_header_text(path);
-  const std::string separators = separator == ' ' ? " \t" : std::string(1, separator);
   HeaderWords words;
   for (std::size_t at = 0; at < text.size();) {
     std::size_t end = std::min(text.find('\n', at), text.size());
-    const std::size_t equals = text.find_first_of(separators, at);
+    const std::size_t equals = text.find('=', at);
     if (equals < end) {
       const std::size_t open = text.find_first_not_of(" \t", equals + 1);
       if (open < text.size() && text[open] == '{') end = std::min(text.find('}', open), text.size());
@@ -133,12 +117,6 @@ void DescribedSource::place_by_corner(double west, double north, double dx, doub
   place.has_origin = true;
   place.origin_x = west + dx / 2.0;
   place.origin_y = north - dy / 2.0;
-}
-
-void DescribedSource::leave_out_system(const char* what, const std::string& name) {
-  info_.warnings.push_back(loss(fmt::format(
-      "its {} \"{}\" is none that isohf knows: the reference system is left out (`reference_system` names it)", what,
-      printable(name))));
 }
 
 void DescribedSource::require_samples() const {

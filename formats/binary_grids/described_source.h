@@ -13,20 +13,12 @@
 
 namespace isohf {
 
-/// The lines of a header, "key = value" or the like, by their keys in lower case.
+/// The lines of a header, "key = value", by their keys in lower case.
 using HeaderWords = std::map<std::string, std::string, std::less<>>;
 
-/// Reads a header whose keys end before `separator`, a blank standing for any; a value in braces goes on over lines, and
-/// of a key that comes twice the first counts. Throws Error{kCorrupt} for more than 1 MiB.
-[[nodiscard]] HeaderWords read_header_words(const std::string& path, char separator);
-
-/// What a word says, in lower case; empty where it is not there.
-[[nodiscard]] std::string word_in(const HeaderWords& words, std::string_view key);
-
-/// The files of samples and header, of which `path` is one, by their extensions in lower case. Throws Error{kIo} where the
-/// other is not beside it.
-[[nodiscard]] std::pair<std::string, std::string> data_and_header(const std::string& path, const char* data_extension,
-                                                                  const char* header_extension);
+/// Reads a header; a value in braces goes on over lines, and of a key that comes twice the first counts. Throws
+/// Error{kCorrupt} for more than 1 MiB.
+[[nodiscard]] HeaderWords read_header_words(const std::string& path);
 
 /// The whole of a small file that describes another: at most 1 MiB, else Error{kCorrupt}.
 [[nodiscard]] std::string read_header_text(const std::string& path);
@@ -65,8 +57,6 @@ class DescribedSource : public PlainSource {
   void set_scale(double scale, double offset, const char* key);
   /// The place of the first sample's outer corner in the North-West, and the spacing. Cells are areas.
   void place_by_corner(double west, double north, double dx, double dy);
-  /// Warns that a name, of `what`, is not known.
-  void leave_out_system(const char* what, const std::string& name);
   /// Throws Error{kCorrupt} where the file has fewer bytes than the description says.
   void require_samples() const;
   /// Requires the samples, and takes what lies beside it, of `band` as read_auxiliary_metadata has it, and what the user

@@ -25,7 +25,7 @@ class EnviSource final : public DescribedSource {
  public:
   EnviSource(const std::string& data, const std::string& header, const OpenOptions& options)
       : DescribedSource(data, "ENVI", header, options) {
-    const HeaderWords words = read_header_words(header, '=');
+    const HeaderWords words = read_header_words(header);
     set_size(number(words, "samples"), number(words, "lines"));
     const std::int64_t bands = count(number(words, "bands", 1.0), "bands");
     std::vector<std::string> names;

@@ -262,7 +262,6 @@ bool looks_like_grid_header(std::span<const std::byte> head) {
 
 std::unique_ptr<HeightSource> open_header_grid(const std::string& path, const OpenOptions& options) {
   if (has_envi_header(path)) return open_envi(path, options);
-  if (is_file(path + ".rsc")) return open_roi_pac(path, options);
   return std::make_unique<HeaderGridSource>(pair_of(path), options);
 }
 

@@ -39,7 +39,7 @@ bool has_beside(const std::string& path, const char* extension) {
 
 /// The file of samples that a header describes; `path` for any other file.
 std::string samples_of(const std::string& path) {
-  for (const auto& [header, samples] : {std::pair(".sgrd", ".sdat"), {".rdc", ".rst"}}) {
+  for (const auto& [header, samples] : {std::pair(".sgrd", ".sdat"), {".rdc", ".rst"}, {".rsc", ""}}) {
     if (has_extension(path, header)) return std::filesystem::path(path).replace_extension(samples).string();
   }
   return path;
@@ -72,6 +72,18 @@ constexpr Raster kRasters[] = {
     {"an IDRISI raster",
      [](const std::string& path, std::string_view) {
        return has_extension(path, ".rdc") || (has_extension(path, ".rst") && has_beside(path, ".rdc"));
+     }},
+    {"a ROI_PAC raster",
+     [](const std::string& path, std::string_view) {
+       return has_extension(path, ".rsc") || (has_extension(path, ".dem") && has_beside(path, ".dem.rsc"));
+     }},
+    {"a VICAR raster", [](const std::string&, std::string_view head) { return head.starts_with("LBLSIZE="); }},
+    {"a Terragen terrain",
+     [](const std::string&, std::string_view head) { return head.starts_with("TERRAGENTERRAIN "); }},
+    {"a portable graymap",
+     [](const std::string&, std::string_view head) {
+       return head.size() > 2 && head.starts_with("P5") &&
+              std::string_view(" \t\n\v\f\r#").find(head[2]) != std::string_view::npos;
      }},
     {"a Surfer grid",
      [](const std::string&, std::string_view head) {

@@ -25,7 +25,6 @@
 #include "formats/georeference/units.h"
 #include "formats/open_options.h"
 #include "formats/planetary/label_text.h"
-#include "formats/planetary/pds3_place.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -174,15 +173,16 @@ std::optional<double> metres(const LabelFields& fields, const char* key) {
   return length ? std::optional(*number * length->metres) : std::nullopt;
 }
 
+/// What a label says of a raster's place.
+struct Pds3Place {
+  Georeference georeference;
+  std::vector<Warning> warnings;
+};
+
 class Placer {
  public:
-  Placer(const LabelFields& map, std::int64_t columns, std::int64_t rows, LabelOf label, Pds3Place& place)
-      : map_(map),
-        columns_(columns),
-        rows_(rows),
-        is_vicar_(label == LabelOf::kVicar),
-        place_(place),
-        geo_(place.georeference) {}
+  Placer(const LabelFields& map, std::int64_t columns, std::int64_t rows, Pds3Place& place)
+      : map_(map), columns_(columns), rows_(rows), place_(place), geo_(place.georeference) {}
 
   void read(const std::string& target) {
     projection_ = spaced(map_.word("MAP_PROJECTION_TYPE").value_or(""));
@@ -255,7 +255,7 @@ class Placer {
     const double centre = map_.number("CENTER_LATITUDE").value_or(0.0);
     if (!simple) true_latitude_ = map_.number("FIRST_STANDARD_PARALLEL").value_or(centre);
     if (simple) bases_[1] = centre;
-    degrees_ = cylindrical_ && true_latitude_ == 0.0 && !is_vicar_;
+    degrees_ = cylindrical_ && true_latitude_ == 0.0;
 
     const std::string unit = map_.unit("MAP_RESOLUTION");
     const bool per_degree = unit.empty() || unit.find("/deg") != std::string::npos;
@@ -303,15 +303,13 @@ class Placer {
     std::size_t best = 0;
     double best_base = bases_[0];
     double least = INFINITY;
-    for (std::size_t i = 0; i < first.size() && !is_vicar_; ++i) {
+    for (std::size_t i = 0; i < first.size(); ++i) {
       for (const double base : bases_) {
         const double distance = distance_to_bounds(centre_x_ + first[i][0] * spacing_, base + first[i][1] * spacing_);
         if (distance < least) std::tie(best, best_base, least) = std::tuple(i, base, distance);
       }
     }
-    if (is_vicar_) {
-      // Its offsets have one meaning.
-    } else if (!west_ || !north_) {
+    if (!west_ || !north_) {
       // A map round its own middle tells by its size alone.
       const auto middle = [&](double one) {
         return 2.0 * sample == static_cast<double>(columns_) + one && 2.0 * line == static_cast<double>(rows_) + one;
@@ -375,7 +373,6 @@ class Placer {
   const LabelFields& map_;
   std::int64_t columns_;
   std::int64_t rows_;
-  bool is_vicar_;
   Pds3Place& place_;
   Georeference& geo_;
   std::string projection_;
@@ -393,22 +390,24 @@ class Placer {
   std::optional<double> south_;
 };
 
-}  // namespace
-
-Pds3Place place_from_pds3(const std::string& path, const LabelBlock& root, std::int64_t columns, std::int64_t rows,
-                          LabelOf label) {
+/// Interprets TARGET_NAME and IMAGE_MAP_PROJECTION of a label (PDS Standards Reference 3.8, appendix B).
+///
+/// Simple cylindrical maps, and equirectangular ones true at the equator, are placed in degrees, East positive; all
+/// others in metres of their own projection, whose name is carried. The projection offsets count from the middle of
+/// sample (1, 1); MOLA's labels count that sample as 1 instead, and old ones turn the sign. MAXIMUM_LATITUDE and
+/// WESTERNMOST_LONGITUDE, which name edges of pixels, tell which is meant; what they do not confirm is said in a
+/// warning.
+Pds3Place place_from_pds3(const std::string& path, const LabelBlock& root, std::int64_t columns, std::int64_t rows) {
   Pds3Place place;
   const LabelEntry* target = root.entry("TARGET_NAME");
   const std::string name = target == nullptr || target->values.empty() ? "" : target->values.front().text;
   const auto maps = root.all("IMAGE_MAP_PROJECTION");
-  if (!maps.empty()) Placer(LabelFields(path, *maps.front()), columns, rows, label, place).read(name);
+  if (!maps.empty()) Placer(LabelFields(path, *maps.front()), columns, rows, place).read(name);
   ReferenceSystem& system = place.georeference.system;
   system.body = body_of(name, system.semi_major_axis_m);
   if (body_of(name, std::nullopt).empty() && !name.empty()) system.body = capitalised(name);
   return place;
 }
-
-namespace {
 
 class Pds3Source final : public PlainSource {
  public:
@@ -543,7 +542,7 @@ class Pds3Source final : public PlainSource {
     // ISIS writes its special pixels into PDS products: the lowest values of 32 bit floats, up to FF7FFFF9.
     if (info_.sample_type == SampleType::kFloat32 && layout_.stored_as != StoredAs::kVaxFloat)
       info_.valid_min = std::bit_cast<float>(0xFF7FFFFAU);
-    Pds3Place place = place_from_pds3(label_path_, root, info_.width, info_.height, LabelOf::kPds3);
+    Pds3Place place = place_from_pds3(label_path_, root, info_.width, info_.height);
     info_.georeference = std::move(place.georeference);
     info_.warnings.insert(info_.warnings.end(), place.warnings.begin(), place.warnings.end());
   }

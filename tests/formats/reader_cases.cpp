@@ -207,25 +207,6 @@ constexpr const char* kVrt =
 constexpr const char* kEnvi =
     "ENVI\nsamples = 4\nlines = 3\nbands = 2\nheader offset = 2\ndata type = 2\ninterleave = bip\nbyte order = 1\n"
     "map info = {UTM, 1, 1, 500000, 4000000, 30, 30, 32, North, WGS-84}\ndata ignore value = 5\n";
-constexpr const char* kRoiPac =
-    "WIDTH 4\nFILE_LENGTH 3\nX_FIRST 10\nX_STEP 0.5\nY_FIRST 50\nY_STEP -0.5\nPROJECTION LATLON\nDATUM WGS84\n";
-
-std::string vicar() {
-  std::string label =
-      "LBLSIZE=256 FORMAT='HALF' TYPE='IMAGE' RECSIZE=16 ORG='BIL' NL=3 NS=4 NB=2 NBB=8 NLB=1 INTFMT='HIGH' "
-      "REALFMT='IEEE' COMPRESS='NONE'";
-  label.resize(256, ' ');
-  return label + std::string(16, 'h') + counting(48, 2);
-}
-
-std::string terragen() {
-  const auto chunk = [](const char* name, std::int16_t first, std::int16_t second) {
-    return name + little(first) + little(second);
-  };
-  return "TERRAGENTERRAIN " + chunk("SIZE", 2, 0) + chunk("XPTS", 4, 0) + chunk("YPTS", 3, 0) + "SCAL" + little(30.0F) +
-         little(20.0F) + little(10.0F) + chunk("ALTW", 100, 5) + counting(12, 2);
-}
-
 }  // namespace
 
 std::vector<ReaderCase> reader_cases() {
@@ -269,10 +250,6 @@ std::vector<ReaderCase> reader_cases() {
       {"EnviSamples", "a.dat", "  " + counting(24, 2), open_envi, {}},
       {"NetcdfClassic", "a.nc", netcdf(), open_netcdf, {}},
       {"NetcdfByColumns", "a.nc", netcdf(true), open_netcdf, {}},
-      {"RoiPacHeader", "a.dem.rsc", kRoiPac, open_roi_pac, {}},
-      {"Vicar", "a.vic", vicar(), open_vicar, {}},
-      {"Terragen", "a.ter", terragen(), open_terragen, {}},
-      {"Graymap", "a.pgm", "P5\n# of metres\n4 3\n4095\n" + counting(12, 2), open_graymap, {}},
       {"XyzText", "a.xyz", "x y z\n0 0 1\n1 0 2.5\n0 1 3\n1 1 4\n", open_xyz, {}},
       {"Pds4Label", "a.xml", pds4_label("a.dat"), open_pds4, {}},
       {"Pds4Samples", "a.dat", counting(7, 2), open_pds4, {}},
@@ -341,12 +318,6 @@ std::vector<ReaderCase> reader_cases() {
   find("EhdrWorldFile").shortest_valid = 1;
   find("EhdrProjection").shortest_valid = 1;
   find("Isis3Label").shortest_valid = find("Isis3Label").bytes.size() - 1;
-  ReaderCase& roi_pac = find("RoiPacHeader");
-  roi_pac.text = true;
-  roi_pac.shortest_valid = 1;
-  roi_pac.opened = "a.dem";
-  roi_pac.beside = {{"a.dem", counting(12, 2)}};
-  find("Vicar").shortest_valid = find("Vicar").bytes.size() - 20;  // the other band's, and its prefix
   find("XyzText").shortest_valid = find("XyzText").bytes.size() - 1;
   find("PngDescription").shortest_valid = find("PngDescription").bytes.size() - 1;
   find("RawDescription").shortest_valid = find("RawDescription").bytes.size() - 1;

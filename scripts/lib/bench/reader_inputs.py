@@ -121,8 +121,6 @@ class Maker:
     def described(self):
         """Formats whose samples a header or a label describes."""
         self.add("ENVI", "land.dat", self.integers, "-of", "ENVI")
-        self.add("ROI_PAC", "roi_pac.dem", self.integers, "-of", "ROI_PAC")
-        self.add("VICAR", "land.vic", self.integers, "-of", "VICAR")
         self.add("PDS4", "land.xml", self.integers, "-of", "PDS4")
         self.add("netCDF classic", "classic.nc", self.integers, "-of", "netCDF")
         self.add("netCDF-4, Deflate", "deflated.nc", self.integers, "-of", "netCDF", "-co", "FORMAT=NC4", "-co",

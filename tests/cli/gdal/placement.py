@@ -480,7 +480,7 @@ def same_for_gdal(isohf, folder):
         raster.GetRasterBand(1).WriteArray(numpy.arange(240, dtype=numpy.int16).reshape(12, 20))
         raster.SetSpatialRef(system(text))
         raster.SetGeoTransform((10.0, 0.25, 0, 20.0, 0, -0.25) if system(text).IsGeographic() else (5000.0, 100.0, 0, 20000.0, 0, -100.0))
-        for driver, name in (("GTiff", "a.tif"), ("ISIS3", "a.cub"), ("PDS4", "a.xml"), ("VICAR", "a.vic"), ("AAIGrid", "a.asc")):
+        for driver, name in (("GTiff", "a.tif"), ("ISIS3", "a.cub"), ("PDS4", "a.xml"), ("AAIGrid", "a.asc")):
             path = folder / name
             for old in folder.glob("a.*"):
                 old.unlink()
@@ -578,47 +578,6 @@ def numbers_of_no_unit(isohf, folder):
         check(("more than any ground is high; where they are not metres, give --z-scale and --z-offset" in said) == is_told, f"{name}: {said}")
     said = isohf.must("export", folder / "n.isohf", folder / "h.tif", "--type", "f16").stderr
     check("half floats have 11 bits: elevations are rounded by up to 1 of their unit" in said, f"f16: {said}")
-
-
-def vicar(isohf, folder):
-    """Maps in the label of a VICAR file lie where GDAL says, and a label that ends with one as well as one that goes on."""
-    samples = numpy.arange(12, dtype=numpy.int16).reshape(3, 4)
-
-    def same(name):
-        isohf.must("convert", folder / name, "-o", folder / "v.isohf", "--overwrite", "--projection", "none", "--lossless", "-q")
-        isohf.must("restore", folder / "v.isohf", folder / "v.tif", "--overwrite", "-q")
-        ours, theirs = gdal.Open(str(folder / "v.tif")), gdal.Open(str(folder / name))
-        check(ours.GetGeoTransform() == theirs.GetGeoTransform(), f"{name}: {ours.GetGeoTransform()}, must be {theirs.GetGeoTransform()}")
-        check(ours.GetSpatialRef().ExportToProj4() == theirs.GetSpatialRef().ExportToProj4(), f"{name}: another system")
-        check(numpy.array_equal(ours.ReadAsArray(), samples), f"{name}: samples differ")
-
-    raster = gdal.GetDriverByName("MEM").Create("", 4, 3, 1, gdal.GDT_Int16)
-    raster.GetRasterBand(1).WriteArray(samples)
-    raster.SetGeoTransform((500000, 100, 0, 200000, 0, -100))
-    for text in ("+proj=eqc +lat_ts=0 +lon_0=0 +R=3396190", "+proj=eqc +lat_ts=10 +lon_0=30 +R=1737400", "+proj=sinu +lon_0=137 +R=3396190"):
-        raster.SetProjection(system(text).ExportToWkt().replace('DATUM["unknown"', 'DATUM["D_Moon"'))
-        gdal.GetDriverByName("VICAR").CreateCopy(str(folder / "a.vic"), raster)
-        same("a.vic")
-    # Of a map that the label has no words for the place stands beside.
-    raster.SetProjection(system("EPSG:32633").ExportToWkt())
-    gdal.GetDriverByName("VICAR").CreateCopy(str(folder / "d.vic"), raster)
-    (folder / "d.wld").write_text("100\n0\n0\n-100\n500050\n199950\n")
-    (folder / "d.prj").write_text(system("EPSG:32633").ExportToWkt())
-    place = json.loads(isohf.must("info", folder / "d.vic", "--json").stdout)
-    check((place["origin"], place["crs"]["epsg"]) == ({"x": 500050, "y": 199950}, 32633), f"VICAR and what is beside: {place}")
-    head = ("LBLSIZE=1024      FORMAT='HALF' TYPE='IMAGE' BUFSIZ=8 DIM=3 EOL=0 RECSIZE=8 ORG='BSQ' NL=3 NS=4 NB=1 N1=4 N2=3 N3=1 N4=0 NBB=0 NLB=0 "
-            "HOST='X86-64-LINX' INTFMT='LOW' REALFMT='RIEEE' BHOST='X86-64-LINX' BINTFMT='LOW' BLTYPE='' COMPRESS='NONE' EOCI1=0 EOCI2=0 "
-            "PROPERTY='MAP' TARGET_NAME='MARS' A_AXIS_RADIUS=3396.19 B_AXIS_RADIUS=3396.19 C_AXIS_RADIUS=3376.2 "
-            "COORDINATE_SYSTEM_NAME='PLANETOCENTRIC' POSITIVE_LONGITUDE_DIRECTION='EAST' MAP_PROJECTION_TYPE='{}' CENTER_LONGITUDE=30.0 "
-            "CENTER_LATITUDE={} FIRST_STANDARD_PARALLEL=10.0 SECOND_STANDARD_PARALLEL=20.0 SAMPLE_PROJECTION_OFFSET=12.5 "
-            "LINE_PROJECTION_OFFSET=-34.25 MAP_SCALE=0.1 PROPERTY='OTHER' MAP_SCALE=7 TASK='T' USER='me' ")
-    for kind, latitude in (("STEREOGRAPHIC", -90), ("MERCATOR", 10), ("TRANSVERSE_MERCATOR", 10), ("ORTHOGRAPHIC", 10), ("LAMBERT_CONFORMAL_CONIC", 10),
-                           ("LAMBERT_AZIMUTHAL_EQUAL_AREA", 10), ("SINUSOIDAL", 0), ("SIMPLE_CYLINDRICAL", 0)):
-        (folder / "b.vic").write_bytes(head.format(kind, latitude).encode().ljust(1024, b"\0") + samples.tobytes())
-        same("b.vic")
-    (folder / "c.vic").write_bytes(head.format("CYLINDRICAL_EQUAL_AREA", 0).encode().ljust(1024, b"\0") + samples.tobytes())
-    said = isohf.run("info", folder / "c.vic").stderr
-    check("CYLINDRICAL EQUAL AREA is not known" in said, f"VICAR: {said}")
 
 
 def ellipsoidal(isohf, folder):
@@ -782,7 +741,7 @@ made.Write(numpy.zeros((12000, 12000), dtype=numpy.float32))
 
 
 PARTS = (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
-         samples, geojp2, jpeg2000, turns, same_for_gdal, bounds_of_labels, pages, numbers_of_no_unit, vicar, ellipsoidal, large_chunks, feet, voids_of_files, beside_samples, rotated)
+         samples, geojp2, jpeg2000, turns, same_for_gdal, bounds_of_labels, pages, numbers_of_no_unit, ellipsoidal, large_chunks, feet, voids_of_files, beside_samples, rotated)
 
 if __name__ == "__main__":
     sys.exit(run_parts(PARTS, __doc__))

@@ -148,20 +148,6 @@ def of_other_bodies(driver):
     return make_unless_earth
 
 
-def without_heights(driver, datums=None):
-    """Formats that know no system of heights and, some of them, but a few datums: of others GDAL writes another one."""
-    make = create(driver)
-
-    def make_flat(path, system, transform):
-        if system.IsCompound() or (datums and datum_of(system) not in datums):
-            raise RuntimeError("says more than the format")
-        make(path, system, transform)
-        written = gdal.Open(path)
-        if max(written.GetRasterBand(1).ReadRaster(buf_type=gdal.GDT_Byte)) == 0:  # voids lie far below 0
-            raise RuntimeError("is on no map that the format has")
-    return make_flat
-
-
 READERS = {
     "GeoTIFF 1.0": (".tif", create("GTiff", ["GEOTIFF_VERSION=1.0"])),
     "GeoTIFF 1.1": (".tif", create("GTiff", ["GEOTIFF_VERSION=1.1"])),
@@ -172,7 +158,6 @@ READERS = {
     "ENVI": (".dat", create("ENVI")),
     "PNG, .aux.xml": (".png", create("PNG", kind=gdal.GDT_UInt16)),
     "JPEG 2000": (".jp2", create("JP2OpenJPEG", ["REVERSIBLE=YES", "QUALITY=100"], gdal.GDT_UInt16)),
-    "ROI_PAC": (".dem", without_heights("ROI_PAC")),
     "PDS4": (".xml", of_other_bodies("PDS4")),
     "ISIS3": (".cub", of_other_bodies("ISIS3")),
 }

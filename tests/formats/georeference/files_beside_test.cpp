@@ -19,10 +19,9 @@ constexpr const char* kAuxiliary =
 
 TEST(FilesBeside, GdalsSaysWhatTheSamplesOfEveryGridMeanBesideAPrjToo) {
   set_module_folder(ISOHF_BIN_DIR);
-  constexpr std::array kGrids = {"EsriAsciiGrid",    "GrassAsciiGrid", "EhdrHeader", "EhdrProjection",
-                                 "GridFloatSamples", "Dted",           "Hgt",        "EnviHeader",
-                                 "RoiPacHeader",     "XyzText",        "Graymap",    "Npy",
-                                 "TiffTagsFirst",    "TiffTiles",      "PngGray16"};
+  constexpr std::array kGrids = {
+      "EsriAsciiGrid", "GrassAsciiGrid", "EhdrHeader", "EhdrProjection", "GridFloatSamples", "Dted",     "Hgt",
+      "EnviHeader",    "XyzText",        "Npy",        "TiffTagsFirst",  "TiffTiles",        "PngGray16"};
   std::size_t tried = 0;
   for (const ReaderCase& each : reader_cases()) {
     if (std::ranges::count(kGrids, each.name) == 0) continue;
@@ -40,8 +39,8 @@ TEST(FilesBeside, GdalsSaysWhatTheSamplesOfEveryGridMeanBesideAPrjToo) {
                  "PRIMEM[\"Greenwich\",0.0],UNIT[\"Degree\",0.0174532925199433]]");
     }
     const SourceInfo info = each.open(path, each.options)->info();
-    // GDAL takes ENVI's and ROI_PAC's headers for less.
-    const bool goes_first = each.name == "EnviHeader" || each.name == "RoiPacHeader";
+    // GDAL takes ENVI's header for less.
+    const bool goes_first = each.name == "EnviHeader";
     const bool is_scaled = !goes_first && (own.z_scale != 1.0 || own.z_offset != 0.0);
     EXPECT_EQ(info.z_scale, is_scaled ? own.z_scale : 0.5);
     EXPECT_EQ(info.z_offset, is_scaled ? own.z_offset : 100.0);

@@ -26,7 +26,7 @@ class PlaceBeside : public ::testing::Test {
 
   /// A graymap, which OpenImageIO reads.
   std::string graymap(const std::string& name) {
-    write_file(folder_ / name, "P5\n4 2\n255\nabcdefgh");
+    write_file(folder_ / name, "P2\n4 2\n255\n1 2 3 4 5 6 7 8\n");
     return folder_ / name;
   }
   void beside(const std::string& name, const std::string& text) { write_file(folder_ / name, text); }

@@ -28,13 +28,14 @@ class Photo : public ::testing::Test {
     write_file(path, bytes);
     return path;
   }
-  /// A portable pixmap (3) or graymap (1) of noise.
+  /// A portable pixmap (3), or a graymap in text (1), of noise.
   std::string write_pixmap(const std::string& name, int width, int height, int channels) {
     std::string bytes =
-        (channels == 3 ? "P6\n" : "P5\n") + std::to_string(width) + " " + std::to_string(height) + "\n255\n";
+        (channels == 3 ? "P6\n" : "P2\n") + std::to_string(width) + " " + std::to_string(height) + "\n255\n";
     for (int row = 0; row < height; ++row) {
       for (int column = 0; column < width; ++column) {
-        for (int c = 0; c < channels; ++c) bytes.push_back(static_cast<char>(noise(column, row, c)));
+        if (channels == 1) bytes += std::to_string(noise(column, row, 0)) + ' ';
+        for (int c = 0; c < channels && channels == 3; ++c) bytes.push_back(static_cast<char>(noise(column, row, c)));
       }
     }
     return write(name, bytes);
