@@ -66,9 +66,8 @@ namespace isohf {
 [[nodiscard]] std::unique_ptr<HeightSource> open_mbtiles(const std::string& path, const OpenOptions& options);
 
 /// An ESRI ASCII grid: header words in any order and case, then ncols x nrows numbers from the North-West corner on,
-/// broken into lines anywhere; cells are areas. A .prj beside it is read. A GRASS ASCII grid differs in its header
-/// (r.in.ascii), and in that the word of null:, or *, is nodata. Numbers have a decimal point or, all of them, a decimal
-/// comma; nan and inf are nodata. Whole numbers that fit 32 bits become int32 samples, any others float64. Opening
+/// broken into lines anywhere; cells are areas. A .prj beside it is read. Numbers have a decimal point or, all of them,
+/// a decimal comma; nan and inf are nodata. Whole numbers that fit 32 bits become int32 samples, any others float64. Opening
 /// checks every number and keeps the offsets of at most 65536 rows.
 [[nodiscard]] bool looks_like_ascii_grid(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_ascii_grid(const std::string& path, const OpenOptions& options);

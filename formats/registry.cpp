@@ -46,7 +46,7 @@ const std::vector<Reader>& readers() {
       {{"JPEG 2000", {".jp2", ".j2k", ".j2c"}, jp2_library, "takes `channel`"}, looks_like_jp2, open_jp2},
       {{"PMTiles", {".pmtiles"}, nullptr, "takes `encoding` and `part`"}, looks_like_pmtiles, open_pmtiles},
       {{"MBTiles", {".mbtiles"}, mbtiles_library, "takes `encoding` and `part`"}, looks_like_mbtiles, open_mbtiles},
-      {{"ESRI ASCII grid, GRASS ASCII", {".asc"}}, looks_like_ascii_grid, open_ascii_grid, nullptr, true},
+      {{"ESRI ASCII grid", {".asc"}}, looks_like_ascii_grid, open_ascii_grid, nullptr, true},
       {{"GDAL virtual raster", {".vrt"}, nullptr, "takes `channel`"}, looks_like_vrt, open_vrt},
       {{"netCDF classic, GMT", {".nc", ".grd"}, nullptr, "takes `channel`"},
        looks_like_netcdf,

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <filesystem>
 #include <fstream>
@@ -43,6 +44,13 @@ std::string samples_of(const std::string& path) {
     if (has_extension(path, header)) return std::filesystem::path(path).replace_extension(samples).string();
   }
   return path;
+}
+
+/// Whether text begins with a line of GRASS's r.in.ascii, "north: 4928000".
+bool is_grass_text(std::string_view head) {
+  const std::string name = lower_case(trimmed(head.substr(0, head.find(':'))));
+  constexpr std::array<std::string_view, 6> kNames = {"north", "south", "east", "west", "rows", "cols"};
+  return name.size() < head.size() && std::ranges::find(kNames, name) != kNames.end();
 }
 
 /// Whether text begins a record of type A (USGS, Standards for Digital Elevation Models, part 2): codes in columns of six.
@@ -89,6 +97,7 @@ constexpr Raster kRasters[] = {
      [](const std::string&, std::string_view head) {
        return head.starts_with("DSAA") || head.starts_with("DSBB") || head.starts_with("DSRB");
      }},
+    {"a GRASS ASCII raster", [](const std::string&, std::string_view head) { return is_grass_text(head); }},
     {"a USGS DEM", [](const std::string&, std::string_view head) { return is_usgs_dem(head); }},
 };
 

@@ -27,164 +27,6 @@
 namespace isohf {
 namespace {
 
-/// The header of a GRASS ASCII raster (GRASS, r.in.ascii): "north: 4928000", edges of the region, rows:, cols: and,
-/// where they are, null:, type: (int, float, double) and multiplier:. Edges may be degrees as in 45:30:00N.
-class GrassHeader {
- public:
-  /// `path` is for messages.
-  explicit GrassHeader(std::string path) : path_(std::move(path)) {}
-
-  /// Whether `word` is the name of a header line, with its colon, perhaps with a value right behind it.
-  [[nodiscard]] static bool is_name(std::string_view word);
-
-  /// Takes one line: `name` as is_name has it, without the colon. Throws Error{kCorrupt} where it was given before.
-  void add(std::string_view name, std::string_view value, std::uint64_t line);
-
-  /// Size, place, scale and void value into info; the void value is raw, before the multiplier. Throws Error{kCorrupt}.
-  void read(SourceInfo& info) const;
-  [[nodiscard]] bool is_whole() const;  ///< type: int
-  [[nodiscard]] bool has_null() const { return !values_[kNull].text.empty(); }
-  /// The raw value of null:; NaN where it is none or no number (then it is a word among the numbers).
-  [[nodiscard]] double null_value() const;
-  /// The word that means a void; "*" where the header names none.
-  [[nodiscard]] std::string_view null_word() const;
-
- private:
-  enum Name : std::size_t { kNorth, kSouth, kEast, kWest, kRows, kCols, kNull, kType, kMultiplier, kNames };
-  struct Value {
-    std::string text;
-    std::uint64_t line = 0;
-  };
-  [[noreturn]] void refuse(Name name, std::string_view required) const;
-  [[nodiscard]] std::int64_t count(Name name) const;
-  [[nodiscard]] double edge(Name name, bool& degrees) const;
-  static std::size_t find(std::string_view name);
-
-  std::string path_;
-  std::array<Value, kNames> values_;
-};
-
-constexpr std::array<std::string_view, 9> kNameTexts = {"north", "south", "east", "west",      "rows",
-                                                        "cols",  "null",  "type", "multiplier"};
-
-/// "45:30:00.5N" in degrees, South and West negative; false where the text is none.
-bool read_degrees(std::string_view text, double& degrees) {
-  double sign = 1.0;
-  if (!text.empty() && std::string_view("nsewNSEW").find(text.back()) != std::string_view::npos) {
-    if (std::string_view("swSW").find(text.back()) != std::string_view::npos) sign = -1.0;
-    text.remove_suffix(1);
-  }
-  if (!text.empty() && text.front() == '-') {
-    sign = -sign;
-    text.remove_prefix(1);
-  }
-  double unit = 1.0;
-  degrees = 0.0;
-  for (int part = 0; part < 3; ++part, unit /= 60.0) {
-    const std::size_t colon = std::min(text.find(':'), text.size());
-    const std::string_view number = text.substr(0, colon);
-    double value = 0.0;
-    if (!read_decimal(number, value) || !(value >= 0.0) || (part > 0 && value >= 60.0)) return false;
-    degrees += value * unit;
-    if (colon == text.size()) {
-      degrees *= sign;
-      return std::isfinite(degrees);
-    }
-    text.remove_prefix(colon + 1);
-  }
-  return false;
-}
-
-std::size_t GrassHeader::find(std::string_view name) {
-  const std::string plain = lower_case(name);
-  return static_cast<std::size_t>(std::find(kNameTexts.begin(), kNameTexts.end(), plain) - kNameTexts.begin());
-}
-
-bool GrassHeader::is_name(std::string_view word) {
-  const std::size_t colon = word.find(':');
-  return colon != std::string_view::npos && find(word.substr(0, colon)) < kNames;
-}
-
-void GrassHeader::add(std::string_view name, std::string_view value, std::uint64_t line) {
-  Value& known = values_[find(name)];
-  if (!known.text.empty()) {
-    throw Error(ErrorCode::kCorrupt,
-                fmt::format("{}: line {}: {}: is given again, line {} has it; it must be given once", path_, line,
-                            printable(name), known.line));
-  }
-  known = {std::string(value), line};
-}
-
-void GrassHeader::refuse(Name name, std::string_view required) const {
-  throw Error(ErrorCode::kCorrupt, fmt::format("{}: line {}: {}: is \"{}\", must be {}", path_, values_[name].line,
-                                               kNameTexts[name], printable(values_[name].text), required));
-}
-
-std::int64_t GrassHeader::count(Name name) const {
-  const std::string& text = values_[name].text;
-  std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || value < 1) refuse(name, "a whole number from 1 on");
-  return value;
-}
-
-double GrassHeader::edge(Name name, bool& degrees) const {
-  const std::string& text = values_[name].text;
-  double value = 0.0;
-  if (read_decimal(text, value) && std::isfinite(value)) return value;
-  if (!read_degrees(text, value)) refuse(name, "a number, or degrees as in 45:30:00N");
-  degrees = true;
-  return value;
-}
-
-bool GrassHeader::is_whole() const {
-  return lower_case(values_[kType].text) == "int";
-}
-
-double GrassHeader::null_value() const {
-  double value = 0.0;
-  return read_decimal(values_[kNull].text, value) ? value : std::numeric_limits<double>::quiet_NaN();
-}
-
-std::string_view GrassHeader::null_word() const {
-  return has_null() ? std::string_view(values_[kNull].text) : std::string_view("*");
-}
-
-void GrassHeader::read(SourceInfo& info) const {
-  for (const Name name : {kNorth, kSouth, kEast, kWest, kRows, kCols}) {
-    if (values_[name].text.empty()) {
-      throw Error(ErrorCode::kCorrupt,
-                  fmt::format("{}: the header does not say {}:, which it must", path_, kNameTexts[name]));
-    }
-  }
-  info.width = count(kCols);
-  info.height = count(kRows);
-  bool degrees = false;
-  const double north = edge(kNorth, degrees);
-  const double south = edge(kSouth, degrees);
-  const double east = edge(kEast, degrees);
-  const double west = edge(kWest, degrees);
-  if (!(north > south)) refuse(kNorth, fmt::format("North of south: ({})", south));
-  if (!(east > west)) refuse(kEast, fmt::format("East of west: ({})", west));
-  Georeference& place = info.georeference;
-  place.registration = Registration::kArea;
-  if (degrees) place.unit = HorizontalUnit::kDegree;
-  place.spacing_x = (east - west) / static_cast<double>(info.width);
-  place.spacing_y = (north - south) / static_cast<double>(info.height);
-  place.has_origin = true;
-  place.origin_x = west + place.spacing_x / 2.0;
-  place.origin_y = north - place.spacing_y / 2.0;
-  const std::string type = lower_case(values_[kType].text);
-  if (!type.empty() && type != "int" && type != "float" && type != "double") refuse(kType, "int, float or double");
-  if (!values_[kMultiplier].text.empty()) {
-    double scale = 0.0;
-    if (!read_decimal(values_[kMultiplier].text, scale) || !std::isfinite(scale) || scale == 0.0) {
-      refuse(kMultiplier, "a number other than 0");
-    }
-    info.z_scale = scale;
-  }
-}
-
 const std::vector<std::string_view>& known_words() {
   static const std::vector<std::string_view> words = {
       "ncols", "ncol",      "nrows",       "nrow",   "xllcorner", "yllcorner", "xllcenter", "xllcentre", "yllcenter",
@@ -270,29 +112,18 @@ bool read_whole(std::string_view word, std::int32_t& value) {
 class AsciiGridSource final : public FileSource {
  public:
   AsciiGridSource(const std::string& path, const OpenOptions& options)
-      : FileSource(path, "ESRI ASCII grid", options), words_(*file_), grass_(path) {
+      : FileSource(path, "ESRI ASCII grid", options), words_(*file_) {
     (void)choose_band(info_, options, 1);
     GridHeader header(path);
     std::string_view word;
     const bool any = read_header(header, word);
-    if (is_grass_) {
-      info_.format = "GRASS ASCII grid";
-      grass_.read(info_);
-      marked_ = true;
-    } else {
-      header.require_only(known_words());
-      header.read_size(info_);
-      header.read_place(info_);
-      marked_ = header.has("nodatavalue") || header.has("nodata") || !options.void_values.empty();
-    }
+    header.require_only(known_words());
+    header.read_size(info_);
+    header.read_place(info_);
+    marked_ = header.has("nodatavalue") || header.has("nodata") || !options.void_values.empty();
     require_room();
     scan(word, any);
-    if (is_grass_) {
-      const auto stored = void_value_as_stored(info_.sample_type, grass_.null_value());
-      if (grass_.has_null() && stored && !std::isnan(*stored)) info_.void_values = {*stored};
-    } else {
-      header.read_void(info_);
-    }
+    header.read_void(info_);
     read_files_beside(info_, 1);
     if (!marked_ && info_.void_values.empty() && !marker_.empty()) {
       info_.warnings.emplace_back(
@@ -306,12 +137,7 @@ class AsciiGridSource final : public FileSource {
 
   void read_window(const Window& window, std::span<std::byte> samples) override {
     ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
-    const auto read_grass = [this](std::string_view word, double& value) {
-      value = std::numeric_limits<double>::quiet_NaN();
-      return word == grass_.null_word() || read_decimal(word, value);
-    };
     const bool done = info_.sample_type == SampleType::kInt32 ? rows_->read<std::int32_t>(window, samples, read_whole)
-                      : is_grass_                             ? rows_->read<double>(window, samples, read_grass)
                                                               : rows_->read<double>(window, samples, read_decimal);
     if (!done) fail(ErrorCode::kCorrupt, "the file has changed since it was opened");
   }
@@ -329,35 +155,14 @@ class AsciiGridSource final : public FileSource {
       words_.seek(3);
     }
     while (words_.next(word)) {
-      if (GrassHeader::is_name(word)) {
-        read_grass_line(word);
-        continue;
-      }
       double special = 0.0;
       if (std::isalpha(static_cast<unsigned char>(word.front())) == 0 || read_decimal(word, special)) return true;
       const std::string name(word);
       const std::uint64_t line = words_.line();
       if (!words_.next(word)) refuse(ErrorCode::kCorrupt, fmt::format("{} has no value", printable(name)));
-      if (is_grass_) {
-        refuse(ErrorCode::kUnsupported,
-               fmt::format("\"{} {}\" is no line of a GRASS ASCII header", printable(name), printable(word)));
-      }
       header.add(name, word, line);
-      is_esri_ = true;
     }
     return false;
-  }
-
-  /// "name: value" or "name:value".
-  void read_grass_line(std::string_view word) {
-    if (is_esri_) refuse(ErrorCode::kCorrupt, fmt::format("\"{}\" follows lines of an ESRI header", printable(word)));
-    is_grass_ = true;
-    const std::size_t colon = word.find(':');
-    const std::string name(word.substr(0, colon));
-    const std::uint64_t line = words_.line();
-    word.remove_prefix(colon + 1);
-    if (word.empty() && !words_.next(word)) refuse(ErrorCode::kCorrupt, name + ": has no value");
-    grass_.add(name, word, line);
   }
 
   /// A number takes a byte and another one keeps it apart from the next.
@@ -399,12 +204,8 @@ class AsciiGridSource final : public FileSource {
 
   /// Whether a number can be an int32 sample.
   bool check(std::string_view word) {
-    if (is_grass_ && word == grass_.null_word() && std::isnan(grass_.null_value())) return false;
     const Shape shape = shape_of(word);
     if (!shape.number) refuse_word(word);
-    if (is_grass_ && grass_.is_whole() && !shape.whole) {
-      refuse(ErrorCode::kCorrupt, fmt::format("\"{}\" is no whole number, as type: int says", printable(word)));
-    }
     if (shape.decimal != 0 && shape.decimal != decimal_) {
       if (decimal_ != 0) {
         refuse(ErrorCode::kCorrupt, fmt::format("\"{}\" has a decimal {}, numbers before it have the other sign; they "
@@ -434,9 +235,6 @@ class AsciiGridSource final : public FileSource {
   }
 
   TextTokens words_;
-  GrassHeader grass_;
-  bool is_grass_ = false;
-  bool is_esri_ = false;
   std::optional<TextRows> rows_;
   char decimal_ = 0;
   bool marked_ = false;  // a void value is named
@@ -446,9 +244,7 @@ class AsciiGridSource final : public FileSource {
 }  // namespace
 
 bool looks_like_ascii_grid(std::span<const std::byte> head) {
-  const std::string_view word = first_word(text_of(head));
-  if (GrassHeader::is_name(word)) return true;
-  const std::string name = GridHeader::plain_name(word);
+  const std::string name = GridHeader::plain_name(first_word(text_of(head)));
   return std::find(known_words().begin(), known_words().end(), name) != known_words().end();
 }
 

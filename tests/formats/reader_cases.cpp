@@ -213,7 +213,6 @@ std::vector<ReaderCase> reader_cases() {
   const TemporaryFolder folder;
   const std::string esri = "ncols 4\nnrows 3\nxllcorner 100\nyllcorner 200.5\ncellsize 10\nNODATA_value -9999\n";
   const std::string numbers = "1 2.5 3 4\n5 -9999 7e1 8\n9 10 nan 12\n";
-  const std::string grass = "north: 200\nsouth: 180\neast: 130\nwest: 100\nrows: 2\ncols: 3\nnull: -1\ntype: int\n";
   const std::string data = std::string(ISOHF_SOURCE_DIR) + "/tests/formats/data/";
   OpenOptions packed;
   packed.channel = "terrarium";
@@ -230,7 +229,6 @@ std::vector<ReaderCase> reader_cases() {
       {"PngGray16", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint16), open_png, {}},
       {"PngPacked", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint8, 3), open_png, packed},
       {"EsriAsciiGrid", "a.asc", esri + numbers, open_ascii_grid, {}},
-      {"GrassAsciiGrid", "a.asc", grass + "1 2 3\n4 -1 6\n", open_ascii_grid, {}},
       {"GzippedAsciiGrid", "a.asc.gz", gzip(esri + numbers), open_ascii_grid, {}},
       {"EhdrHeader", "a.hdr", kEhdr, open_header_grid, {}},
       {"EhdrWorldFile", "a.blw", "0.5\n0\n0\n-0.5\n100.5\n200.5\n", open_header_grid, {}},
@@ -306,14 +304,13 @@ std::vector<ReaderCase> reader_cases() {
   picture.opened = "described.png";
   picture.beside = {{picture.opened, written(folder, picture.opened, 6, 5, SampleType::kUint16)}};
   picture.bytes = read_file(folder / picture.file_name);
-  for (const char* name : {"EsriAsciiGrid", "GrassAsciiGrid", "Pds3", "Isis3", "Isis3Label", "Dted", "PngDescription",
-                           "RawDescription", "Npy", "Vrt", "Pds4Label", "XyzText"}) {
+  for (const char* name : {"EsriAsciiGrid", "Pds3", "Isis3", "Isis3Label", "Dted", "PngDescription", "RawDescription",
+                           "Npy", "Vrt", "Pds4Label", "XyzText"}) {
     find(name).text = true;
   }
   // The last digits of a text can be missing without trace; a world file, a .prj and a label's last words are not
   // needed.
   find("EsriAsciiGrid").shortest_valid = find("EsriAsciiGrid").bytes.size() - 2;
-  find("GrassAsciiGrid").shortest_valid = find("GrassAsciiGrid").bytes.size() - 1;
   find("EhdrHeader").shortest_valid = 1;
   find("EhdrWorldFile").shortest_valid = 1;
   find("EhdrProjection").shortest_valid = 1;

@@ -178,6 +178,7 @@ TEST(OpenSource, NamesTheCommandThatConvertsARasterOfAnotherProgram) {
     std::string converted = {};  ///< the file that the command names, if another
   };
   const Row rows[] = {
+      {"grass.asc", "north: 200\nsouth: 180\n", "a GRASS ASCII raster"},
       {"a.dem", std::string(144, ' ') + "     1     1     1    12", "a USGS DEM"},
       {"a.sdat", "12", "a SAGA grid"},
       {"a.sgrd", "NAME = a\n", "a SAGA grid", "gdal_translate", "", "a.sdat"},

@@ -207,57 +207,6 @@ TEST_F(AsciiGrid, WarnsOfDegreesThatNothingDeclares) {
   EXPECT_THAT(warnings("-105.55", "0.000833333333"), IsEmpty());
 }
 
-constexpr const char* kGrass = "north: 200\nsouth: 180\neast: 130\nwest: 100\nrows: 2\ncols: 3\n";
-
-TEST_F(AsciiGrid, ReadsAGrassHeader) {
-  const auto source = open(std::string(kGrass) + "1 2 3\n4 5 *\n");
-  const SourceInfo& info = source->info();
-  EXPECT_EQ(info.format, "GRASS ASCII grid");
-  ASSERT_EQ(info.width, 3);
-  ASSERT_EQ(info.height, 2);
-  EXPECT_EQ(info.georeference.registration, Registration::kArea);
-  EXPECT_EQ(info.georeference.spacing_x, 10.0);
-  EXPECT_EQ(info.georeference.origin_x, 105.0);
-  EXPECT_EQ(info.georeference.origin_y, 195.0);
-  ASSERT_EQ(info.sample_type, SampleType::kFloat64);
-  const auto all = read_whole(*source);
-  EXPECT_EQ(value_at(info.sample_type, all, 4), 5.0);
-  EXPECT_TRUE(std::isnan(value_at(info.sample_type, all, 5)));
-  EXPECT_THAT(info.warnings, IsEmpty());
-}
-
-TEST_F(AsciiGrid, ReadsGrassNullTypeMultiplierAndDegrees) {
-  const auto whole = open(std::string("COLS:3\nrows:2\nNorth:45:30:00N\nsouth:45N\nwest:0:30W\neast:1E\n") +
-                          "null: -99\ntype: int\nmultiplier: 0.5\n1 2 3\n4 -99 6\n");
-  const SourceInfo& info = whole->info();
-  ASSERT_EQ(info.sample_type, SampleType::kInt32);
-  EXPECT_EQ(info.void_values, std::vector<double>{-99.0});
-  EXPECT_EQ(info.z_scale, 0.5);
-  EXPECT_EQ(info.georeference.unit, HorizontalUnit::kDegree);
-  EXPECT_EQ(info.georeference.spacing_x, 0.5);
-  EXPECT_EQ(info.georeference.spacing_y, 0.25);
-  EXPECT_EQ(info.georeference.origin_x, -0.25);
-  EXPECT_EQ(info.georeference.origin_y, 45.375);
-  EXPECT_EQ(value_at(SampleType::kInt32, read_whole(*whole), 5), 6.0);
-}
-
-TEST_F(AsciiGrid, RefusesAGrassHeaderThatIsWrong) {
-  const std::string rest = "1 2 3 4 5 6\n";
-  const auto what = [&](const std::string& text) { return std::string(refusal(text).what()); };
-  EXPECT_THAT(what("rows: 2\ncols: 3\n" + rest), HasSubstr("the header does not say north:"));
-  EXPECT_THAT(what(kGrass + std::string("rows: 2\n") + rest), HasSubstr("line 7: rows: is given again, line 5 has it"));
-  EXPECT_THAT(what(kGrass + std::string("type: complex\n") + rest), HasSubstr("must be int, float or double"));
-  EXPECT_THAT(what(kGrass + std::string("type: int\n1 2 3 4 5.5 6\n")), HasSubstr("\"5.5\" is no whole number"));
-  EXPECT_THAT(what(kGrass + std::string("null: -1\n1 2 3 4 5 *\n")), HasSubstr("\"*\" is not a number"));
-  EXPECT_THAT(what(kGrass + std::string("colour: 1\n") + rest), HasSubstr("is no line of a GRASS ASCII header"));
-  EXPECT_THAT(what(kGrass + std::string("multiplier: 0\n") + rest), HasSubstr("a number other than 0"));
-  EXPECT_THAT(what("ncols 3\n" + std::string(kGrass) + rest), HasSubstr("\"north:\" follows lines of an ESRI header"));
-  EXPECT_THAT(what("north: 1\nsouth: 2\neast: 1\nwest: 0\nrows: 2\ncols: 3\n" + rest),
-              HasSubstr("must be North of south: (2)"));
-  EXPECT_THAT(what("north: 1:60N\nsouth: 0\neast: 1\nwest: 0\nrows: 2\ncols: 3\n" + rest),
-              HasSubstr("must be a number, or degrees"));
-}
-
 TEST_F(AsciiGrid, SurvivesZeroBytesAtTheEnd) {
   for (const std::size_t zeros : {1U, 2U, 5000U}) {
     std::string text = std::string(kHeader) + "1 2 3\n4 5 6" + std::string(zeros, '\0');
