@@ -49,12 +49,6 @@ namespace isohf {
 [[nodiscard]] bool looks_like_webp(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_webp(const std::string& path, const OpenOptions& options);
 
-/// A component of a JPEG 2000 file or codestream through libopenjp2, up to 31 bits, signed or not, no palette applied:
-/// decoded strip by strip, of a tiled one a row of tiles at a time. options.channel is its number. A GeoJP2 box places it,
-/// else files beside it. Colours of 8 bits without a channel are left to open_with_oiio().
-[[nodiscard]] bool looks_like_jp2(std::span<const std::byte> head);
-[[nodiscard]] std::unique_ptr<HeightSource> open_jp2(const std::string& path, const OpenOptions& options);
-
 /// Elevations packed into the tiles of a web map (PNG or lossless WebP, one size, a power of two), as one raster in Web
 /// Mercator: of the finest zoom level, or options.part's. Where a tile is missing, or transparent, is nodata.
 /// options.channel is the packing; else the file's "encoding" counts, else what the bytes show. A row of tiles is kept, up
@@ -191,7 +185,6 @@ namespace isohf {
 [[nodiscard]] std::string png_library();
 [[nodiscard]] std::string tiff_library();
 [[nodiscard]] std::string webp_library();
-[[nodiscard]] std::string jp2_library();
 
 /// The most bytes that the pixels of an interlaced PNG may take: 1 GiB.
 inline constexpr std::uint64_t kMaxInterlacedBytes = std::uint64_t{1} << 30U;

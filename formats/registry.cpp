@@ -43,7 +43,6 @@ const std::vector<Reader>& readers() {
       {{"TIFF", {".tif", ".tiff"}, tiff_library, "takes `channel` and `part`"}, looks_like_tiff, open_tiff},
       {{"PNG", {".png"}, png_library, "takes `channel` and `encoding`"}, looks_like_png, open_png},
       {{"WebP", {".webp"}, webp_library, "takes `channel` and `encoding`"}, looks_like_webp, open_webp},
-      {{"JPEG 2000", {".jp2", ".j2k", ".j2c"}, jp2_library, "takes `channel`"}, looks_like_jp2, open_jp2},
       {{"PMTiles", {".pmtiles"}, nullptr, "takes `encoding` and `part`"}, looks_like_pmtiles, open_pmtiles},
       {{"MBTiles", {".mbtiles"}, mbtiles_library, "takes `encoding` and `part`"}, looks_like_mbtiles, open_mbtiles},
       {{"ESRI ASCII grid", {".asc"}}, looks_like_ascii_grid, open_ascii_grid, nullptr, true},

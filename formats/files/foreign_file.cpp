@@ -73,6 +73,10 @@ bool is_usgs_dem(std::string_view head) {
 }
 
 constexpr Raster kRasters[] = {
+    {"a JPEG 2000 picture",
+     [](const std::string&, std::string_view head) {
+       return head.starts_with("\0\0\0\x0CjP  \r\n\x87\n"sv) || head.starts_with("\xFF\x4F\xFF\x51");
+     }},
     {"an ERDAS Imagine raster",
      [](const std::string&, std::string_view head) { return head.starts_with("EHFA_HEADER_TAG"); }},
     {"a SAGA grid", [](const std::string& path,

@@ -42,7 +42,7 @@ int guarded(IsohfOiioMessage* message, Action action) {
   return isohf::guarded(message, "OpenImageIO", ErrorCode::kCorrupt, action);
 }
 
-/// A header or a string of boxes ends within it, or the file is none that isohf judges.
+/// A header ends within it, or the file is none that isohf judges.
 constexpr std::size_t kHeaderBytes = std::size_t{1} << 20U;
 
 std::vector<unsigned char> head_of(const std::string& path) {
@@ -72,30 +72,6 @@ long largest_value(const std::vector<unsigned char>& head) {
   return numbers[2];
 }
 
-/// What a JPEG 2000 codestream says of the samples of one component.
-struct ComponentKind {
-  int bits = 0;
-  bool is_signed = false;
-};
-
-/// Of every component: ISO 15444-1, A.5.1, the marker SIZ behind SOC. The codestream stands in the box jp2c (I.5.4) or
-/// alone; empty where it was not found.
-std::vector<ComponentKind> component_kinds(const std::vector<unsigned char>& head) {
-  constexpr std::array<unsigned char, 4> kStart = {0xFF, 0x4F, 0xFF, 0x51};  // SOC, SIZ
-  constexpr std::ptrdiff_t kCount = 40;                                      // Csiz, from SOC
-  constexpr std::ptrdiff_t kFirst = kCount + 2;                              // Ssiz, XRsiz, YRsiz of each
-  const auto start = std::search(head.begin(), head.end(), kStart.begin(), kStart.end());
-  std::vector<ComponentKind> kinds;
-  if (head.end() - start < kFirst) return kinds;
-  const std::ptrdiff_t count = 256 * start[kCount] + start[kCount + 1];
-  if (head.end() - start < kFirst + 3 * count) return kinds;
-  for (std::ptrdiff_t i = 0; i < count; ++i) {
-    const unsigned kind = start[kFirst + 3 * i];
-    kinds.push_back({static_cast<int>(kind & 0x7FU) + 1, (kind & 0x80U) != 0});
-  }
-  return kinds;
-}
-
 [[noreturn]] void refuse(const std::string& what) {
   throw Error(ErrorCode::kUnsupported, what + "; store the raster as TIFF or PNG (gdal_translate does)");
 }
@@ -117,21 +93,6 @@ void require_stored_numbers(const std::string& format, int bits, int stored_bits
       refuse("the largest value is stated as " + std::to_string(largest) +
              ", and OpenImageIO spreads the samples over 0 to 255");
     }
-  }
-}
-
-/// What is left of JPEG 2000 here, photos and packed elevations, is of unsigned samples.
-void require_unsigned(const IsohfOiioRaster& raster, int bits, bool is_photo, const std::string& path) {
-  const std::vector<ComponentKind> kinds = component_kinds(head_of(path));
-  if (kinds.empty()) refuse("there is no codestream in its first MiB, so that nothing says whether samples are signed");
-  if (static_cast<int>(kinds.size()) < raster.channel + raster.channels) return;  // made of a palette, unsigned
-  const auto first = kinds.begin() + raster.channel;
-  const auto end = first + raster.channels;
-  const auto is_signed = [](const ComponentKind& kind) { return kind.is_signed; };
-  if (std::any_of(first, end, is_signed)) refuse("the samples are signed, which OpenImageIO reads as if they were not");
-  if (!is_photo && raster.channels == 1 && first->bits != bits) {
-    refuse("the samples of this channel have " + std::to_string(first->bits) +
-           " bits, and OpenImageIO spreads them over " + std::to_string(bits));
   }
 }
 
@@ -224,7 +185,6 @@ bool open_raster(IsohfOiioRaster& raster, const char* path, const std::string& c
   raster.channel = all ? 0 : channel_index(spec, channel);
   raster.channels = all ? spec.nchannels : 1;
   raster.type = all ? spec.format : spec.channelformat(raster.channel);
-  if (std::string_view(raster.input->format_name()) == "jpeg2000") require_unsigned(raster, bits, is_photo, path);
   const std::string space = spec.get_string_attribute("oiio:ColorSpace");
   info.channels = raster.channels;
   info.alpha = spec.alpha_channel;

@@ -215,11 +215,16 @@ OiioFormats oiio_formats() {
   const IsohfOiioModule& module = oiio_module();
   OiioFormats formats{module.library(), {}};
   std::istringstream extensions(module.extensions());
-  for (std::string extension; extensions >> extension;) formats.extensions.push_back("." + extension);
+  for (std::string extension; extensions >> extension;) {
+    if (extension != "jp2" && extension != "j2k" && extension != "j2c") formats.extensions.push_back("." + extension);
+  }
   return formats;
 }
 
 std::unique_ptr<PhotoRows> open_oiio_rows(PhotoInfo& info) {
+  if (const ForeignFile found = foreign_file(info.path); !found.help.empty()) {
+    throw Error(ErrorCode::kUnsupported, "this is " + found.is + "; " + found.help);
+  }
   return std::make_unique<OiioRows>(info);
 }
 

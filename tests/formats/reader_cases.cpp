@@ -254,8 +254,6 @@ std::vector<ReaderCase> reader_cases() {
       {"StreamedAsciiGrid", "a.asc.gz", gzip(esri + numbers), open_ascii_grid, streamed},
       {"ZipOfGrid", "a.zip", zip("d/a.asc", esri + numbers), open_packed, {}},
       {"TarOfGrid", "a.tar", tar_archive({{"d/a.asc", esri + numbers}}), open_packed, {}},
-      {"Jpeg2000", "a.j2k", read_file(data + "signed8.j2k"), open_jp2, {}},
-      {"Jpeg2000Tiled", "a.jp2", read_file(data + "tiled.jp2"), open_jp2, {}},
       {"Webp", "a.webp", read_file(data + "small.webp"), open_webp, packed},
       {"Pmtiles", "a.pmtiles", read_file(data + "small.pmtiles"), open_pmtiles, {}},
       {"PngDescription", "described.png.json", "", open_png, {}},

@@ -15,6 +15,7 @@
 #include "formats/reader_failure.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/error.h"
+#include "isohf/picture.h"
 #include "isohf/raster.h"
 #include "support/rasters/samples.h"
 #include "support/real_files.h"
@@ -192,6 +193,8 @@ TEST(OpenSource, NamesTheCommandThatConvertsARasterOfAnotherProgram) {
       {"text.grd", "DSAA\n4 3\n", "a Surfer grid"},
       {"six.grd", "DSBB", "a Surfer grid"},
       {"seven.grd", "DSRB", "a Surfer grid"},
+      {"a.jp2", std::string("\0\0\0\x0CjP  \r\n\x87\n", 12), "a JPEG 2000 picture"},
+      {"a.j2k", "\xFF\x4F\xFF\x51", "a JPEG 2000 picture"},
       {"a.img", "EHFA_HEADER_TAG", "an ERDAS Imagine raster"},
   };
   for (const Row& row : rows) {
@@ -203,8 +206,10 @@ TEST(OpenSource, NamesTheCommandThatConvertsARasterOfAnotherProgram) {
     EXPECT_EQ(native_format_of(path, {}), nullptr);
     const Error error = refusal(path);
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
-    EXPECT_THAT(error.what(), HasSubstr(path + ": this is " + row.says + "; " + row.command + ' ' +
-                                        (folder / (row.converted.empty() ? row.name : row.converted))));
+    const std::string says = path + ": this is " + row.says + "; " + row.command + ' ' +
+                             (folder / (row.converted.empty() ? row.name : row.converted));
+    EXPECT_THAT(error.what(), HasSubstr(says));
+    EXPECT_THAT(error_of([&] { (void)open_photo(path); }).what(), HasSubstr(says));
   }
   EXPECT_FALSE(is_loaded({"libgdal", "OpenImageIO", "isohf_oiio"}));
   set_module_folder("");

@@ -140,7 +140,6 @@ class Maker:
         self.inputs["WebP"].options = ["--encoding", "mapbox"]
 
     def pictures(self):
-        self.add("JPEG 2000", "land.jp2", self.integers, "-of", "JP2OpenJPEG", "-co", "REVERSIBLE=YES", "-co", "QUALITY=100")
         self.add("PNG, 16 bits", "land.png", self.integers, "-of", "PNG", "-ot", "UInt16")
         deflate = ["-co", "COMPRESS=DEFLATE"]
         self.add("GeoTIFF, tiles, Deflate", "tiles.tif", self.integers, "-co", "TILED=YES", *deflate, "-co", "PREDICTOR=2")

@@ -361,83 +361,6 @@ def samples(isohf, folder):
     check(numpy.array_equal(gdal.Open(str(folder / "w.png")).ReadAsArray(), whole), "samples of a PNG differ")
 
 
-def geojp2(isohf, folder):
-    """A JPEG 2000 file that GDAL gives a GeoTIFF's tags in a box, and nothing beside it, lies where GDAL says."""
-    driver = gdal.GetDriverByName("JP2OpenJPEG")
-    if driver is None:
-        return
-    for text, place in (("EPSG:32632", (500000.0, 10.0, 0.0, 5200000.0, 0.0, -10.0)),
-                        ("EPSG:2154", (700000.0, 25.0, 0.0, 6600000.0, 0.0, -25.0)),
-                        ("EPSG:4326", (8.0, 0.001, 0.0, 47.0, 0.0, -0.001))):
-        raster = gdal.GetDriverByName("MEM").Create("", 70, 50, 1, gdal.GDT_UInt16)
-        raster.SetProjection(system(text).ExportToWkt())
-        raster.SetGeoTransform(place)
-        raster.GetRasterBand(1).WriteArray(numpy.arange(3500, dtype=numpy.uint16).reshape(50, 70))
-        driver.CreateCopy(str(folder / "a.jp2"), raster, options=["REVERSIBLE=YES", "QUALITY=100", "GMLJP2=NO"])
-        (folder / "a.jp2.aux.xml").unlink(missing_ok=True)
-        said = isohf.must("convert", folder / "a.jp2", "-o", folder / "a.isohf", "--overwrite", "--projection", "none",
-                          "--lossless").stderr
-        check("place" not in said, f"GeoJP2: {said}")
-        isohf.must("restore", folder / "a.isohf", folder / "a.tif", "--overwrite", "-q")
-        ours = gdal.Open(str(folder / "a.tif"))
-        check(ours.GetGeoTransform() == place, f"GeoJP2 {text}: {ours.GetGeoTransform()}")
-        own = ours.GetSpatialRef()
-        check(own is not None and own.IsSame(system(text), ["IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES"]), f"GeoJP2 {text}: another system")
-        check(numpy.array_equal(ours.ReadAsArray(), raster.ReadAsArray()), f"GeoJP2 {text}: samples differ")
-    # What the box does not say stands beside it.
-    raster.GetRasterBand(1).SetNoDataValue(17)
-    raster.GetRasterBand(1).SetScale(0.5)
-    raster.GetRasterBand(1).SetOffset(-100)
-    driver.CreateCopy(str(folder / "a.jp2"), raster, options=["REVERSIBLE=YES", "QUALITY=100", "GMLJP2=NO"])
-    said = json.loads(isohf.must("info", folder / "a.jp2", "--json").stdout)
-    check((said["void_values"], said["z_scale"], said["z_offset"]) == ([17], 0.5, -100), f"GeoJP2 beside: {said}")
-    # A system that is refused names the file.
-    raster.SetProjection(system("EPSG:4807").ExportToWkt())
-    driver.CreateCopy(str(folder / "b.jp2"), raster, options=["REVERSIBLE=YES", "QUALITY=100", "GMLJP2=NO"])
-    (folder / "b.jp2.aux.xml").unlink(missing_ok=True)
-    isohf.refuses(f"{folder / 'b.jp2'}: the reference system", "info", folder / "b.jp2")
-    # Every number of 16 signed bits, in one codestream, in tiles, and with losses.
-    for options in (["REVERSIBLE=YES", "QUALITY=100"], ["REVERSIBLE=YES", "QUALITY=100", "BLOCKXSIZE=64", "BLOCKYSIZE=64"], ["QUALITY=20"]):
-        signed = gdal.GetDriverByName("MEM").Create("", 256, 256, 1, gdal.GDT_Int16)
-        signed.GetRasterBand(1).WriteArray(numpy.arange(-32768, 32768, dtype=numpy.int16).reshape(256, 256))
-        driver.CreateCopy(str(folder / "s.jp2"), signed, options=options)
-        isohf.must("convert", folder / "s.jp2", "-o", folder / "s.isohf", "--overwrite", "-q", "--lossless")
-        isohf.must("restore", folder / "s.isohf", folder / "s.tif", "--overwrite", "-q")
-        theirs = gdal.Open(str(folder / "s.jp2")).ReadAsArray()
-        check(numpy.array_equal(gdal.Open(str(folder / "s.tif")).ReadAsArray(), theirs), f"signed JPEG 2000, {options}: samples differ")
-
-
-def jpeg2000(isohf, folder):
-    """Numbers of any bits come as they are, decoded by parts: strips, or tiles, wherever the picture begins."""
-    driver = gdal.GetDriverByName("JP2OpenJPEG")
-    if driver is None:
-        return
-    rng = numpy.random.default_rng(7)
-    for bits, kind, low, high, options in ((8, gdal.GDT_Byte, 0, 255, ()), (10, gdal.GDT_UInt16, 0, 1023, ("NBITS=10",)),
-                                           (16, gdal.GDT_UInt16, 0, 65535, ("BLOCKXSIZE=64", "BLOCKYSIZE=48")),
-                                           (16, gdal.GDT_Int16, -32768, 32767, ("BLOCKXSIZE=4096", "BLOCKYSIZE=4096")),
-                                           (20, gdal.GDT_UInt32, 0, (1 << 20) - 1, ("NBITS=20", "CODEC=J2K"))):
-        for width, height in ((300, 700), (5000, 70)):
-            samples = rng.integers(low, high, (height, width), endpoint=True)
-            raster = gdal.GetDriverByName("MEM").Create("", width, height, 1, kind)
-            raster.GetRasterBand(1).WriteArray(samples)
-            driver.CreateCopy(str(folder / "a.jp2"), raster, options=["REVERSIBLE=YES", "QUALITY=100", *options])
-            isohf.must("convert", folder / "a.jp2", "-o", folder / "a.isohf", "--overwrite", "-q", "--lossless")
-            isohf.must("restore", folder / "a.isohf", folder / "a.tif", "--overwrite", "-q")
-            check(numpy.array_equal(gdal.Open(str(folder / "a.tif")).ReadAsArray(), samples), f"JPEG 2000 of {bits} bits, {options}: samples differ")
-    smooth = numpy.add.outer(numpy.arange(4096), numpy.arange(4096)).astype(numpy.uint16)
-    raster = gdal.GetDriverByName("MEM").Create("", 4096, 4096, 1, gdal.GDT_UInt16)
-    raster.GetRasterBand(1).WriteArray(smooth)
-    driver.CreateCopy(str(folder / "one.jp2"), raster, options=["REVERSIBLE=YES", "QUALITY=100", "BLOCKXSIZE=4096", "BLOCKYSIZE=4096"])
-    measured = subprocess.run([sys.executable, "-c", PEAK, f"{isohf.bin}/isohf", "convert", str(folder / "one.jp2"), "-o", str(folder / "o.isohf"),
-                               "-q", "--memory", "100M", "--threads", "1"], stdout=subprocess.PIPE, text=True, check=True)
-    check(int(measured.stdout) < 100000, f"JPEG 2000 of one tile within 100 MB takes {measured.stdout} kB; whole it is 64 MB of samples alone")
-    whole = (folder / "one.jp2").read_bytes()
-    for length in (len(whole) // 3, len(whole) - 40):
-        (folder / "cut.jp2").write_bytes(whole[:length])
-        isohf.refuses("its codestream is damaged or cut off", "convert", folder / "cut.jp2", "-o", folder / "c.isohf", "-q")
-
-
 def turns(isohf, folder):
     """Globes in metres go round as those in degrees do: to the samples of their other end, at whatever longitude that is."""
     turn, turn_of_mars = 2 * math.pi * 6378137.0, 2 * math.pi * 3396190.0
@@ -741,7 +664,7 @@ made.Write(numpy.zeros((12000, 12000), dtype=numpy.float32))
 
 
 PARTS = (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
-         samples, geojp2, jpeg2000, turns, same_for_gdal, bounds_of_labels, pages, numbers_of_no_unit, ellipsoidal, large_chunks, feet, voids_of_files, beside_samples, rotated)
+         samples, turns, same_for_gdal, bounds_of_labels, pages, numbers_of_no_unit, ellipsoidal, large_chunks, feet, voids_of_files, beside_samples, rotated)
 
 if __name__ == "__main__":
     sys.exit(run_parts(PARTS, __doc__))

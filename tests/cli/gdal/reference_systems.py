@@ -157,7 +157,6 @@ READERS = {
     "EHdr": (".bil", create("EHdr")),
     "ENVI": (".dat", create("ENVI")),
     "PNG, .aux.xml": (".png", create("PNG", kind=gdal.GDT_UInt16)),
-    "JPEG 2000": (".jp2", create("JP2OpenJPEG", ["REVERSIBLE=YES", "QUALITY=100"], gdal.GDT_UInt16)),
     "PDS4": (".xml", of_other_bodies("PDS4")),
     "ISIS3": (".cub", of_other_bodies("ISIS3")),
 }
