@@ -52,12 +52,9 @@ namespace isohf {
 /// Elevations packed into the tiles of a web map (PNG or lossless WebP, one size, a power of two), as one raster in Web
 /// Mercator: of the finest zoom level, or options.part's. Where a tile is missing, or transparent, is nodata.
 /// options.channel is the packing; else the file's "encoding" counts, else what the bytes show. A row of tiles is kept, up
-/// to 256 MiB. PMTiles (version 3, directories plain or in gzip) natively, MBTiles (1.3) through SQLite in the module
-/// isohf_mbtiles.so.
+/// to 256 MiB. Of PMTiles version 3 is read, directories plain or in gzip.
 [[nodiscard]] bool looks_like_pmtiles(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_pmtiles(const std::string& path, const OpenOptions& options);
-[[nodiscard]] bool looks_like_mbtiles(std::span<const std::byte> head);
-[[nodiscard]] std::unique_ptr<HeightSource> open_mbtiles(const std::string& path, const OpenOptions& options);
 
 /// An ESRI ASCII grid: header words in any order and case, then ncols x nrows numbers from the North-West corner on,
 /// broken into lines anywhere; cells are areas. A .prj beside it is read. Numbers have a decimal point or, all of them,
@@ -180,7 +177,6 @@ namespace isohf {
 
 /// Name and version of the libraries that formats are read and written with, as they run: "libtiff 4.5.0".
 [[nodiscard]] std::string exr_library();
-[[nodiscard]] std::string mbtiles_library();
 [[nodiscard]] std::string netcdf_library();
 [[nodiscard]] std::string png_library();
 [[nodiscard]] std::string tiff_library();

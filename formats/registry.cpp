@@ -44,7 +44,6 @@ const std::vector<Reader>& readers() {
       {{"PNG", {".png"}, png_library, "takes `channel` and `encoding`"}, looks_like_png, open_png},
       {{"WebP", {".webp"}, webp_library, "takes `channel` and `encoding`"}, looks_like_webp, open_webp},
       {{"PMTiles", {".pmtiles"}, nullptr, "takes `encoding` and `part`"}, looks_like_pmtiles, open_pmtiles},
-      {{"MBTiles", {".mbtiles"}, mbtiles_library, "takes `encoding` and `part`"}, looks_like_mbtiles, open_mbtiles},
       {{"ESRI ASCII grid", {".asc"}}, looks_like_ascii_grid, open_ascii_grid, nullptr, true},
       {{"GDAL virtual raster", {".vrt"}, nullptr, "takes `channel`"}, looks_like_vrt, open_vrt},
       {{"netCDF classic, GMT", {".nc", ".grd"}, nullptr, "takes `channel`"},
@@ -327,7 +326,7 @@ std::unique_ptr<HeightSource> open_by_head(const std::string& path, const OpenOp
                 path + ": is something unknown in gzip, which isohf does not read; gunzip it first");
   }
   if (reader == nullptr) return open_with_oiio(path, options);
-  const auto has_parts = {open_exr, open_tiff, open_packed, open_pmtiles, open_mbtiles};
+  const auto has_parts = {open_exr, open_tiff, open_packed, open_pmtiles};
   if (!options.part.empty() && std::ranges::find(has_parts, reader->open) == has_parts.end()) {
     throw Error(
         ErrorCode::kInvalidArgument,

@@ -51,7 +51,7 @@ constexpr const char* kNotes = R"(Results go to standard output, everything else
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 differences (verify, diff, restore), 130 interrupted.
 
-ISOHF_MODULE_PATH names the folder of the OpenImageIO, PROJ, netCDF and MBTiles modules (default: beside the program, then ../lib/isohf).
+ISOHF_MODULE_PATH names the folder of the OpenImageIO, PROJ and netCDF modules (default: beside the program, then ../lib/isohf).
 ISOHF_SIMD=off runs the plain twins of vectorised code: slower, and the same bytes.
 NO_COLOR turns colours off, CLICOLOR_FORCE=1 keeps them in pipes.
 

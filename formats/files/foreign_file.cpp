@@ -77,6 +77,13 @@ constexpr Raster kRasters[] = {
      [](const std::string&, std::string_view head) {
        return head.starts_with("\0\0\0\x0CjP  \r\n\x87\n"sv) || head.starts_with("\xFF\x4F\xFF\x51");
      }},
+    {"an MBTiles file",
+     [](const std::string& path, std::string_view head) {
+       return head.starts_with("SQLite format 3") &&
+              (has_extension(path, ".mbtiles") ||
+               head.substr(std::min<std::size_t>(68, head.size())).starts_with("MPBX"));
+     },
+     "pmtiles convert {} OUT.pmtiles makes a PMTiles archive of it"},
     {"an ERDAS Imagine raster",
      [](const std::string&, std::string_view head) { return head.starts_with("EHFA_HEADER_TAG"); }},
     {"a SAGA grid", [](const std::string& path,

@@ -65,11 +65,6 @@ class TileSource final : public HeightSource {
     info_.block_width = info_.block_height = side_;
     packing_ = choose_packing(options.channel);
     describe_packing(packing_, kChannels, 8, info_);
-    if (store_->says_other_rows()) {
-      info_.warnings.emplace_back(
-          "its metadata say that rows count from the North (scheme xyz); the format's, and GDAL's, count from the "
-          "South, as they are read: look whether it lies where it should");
-    }
     place_web_tiles(zoom_, box_.first_column, box_.first_row, side_, info_);
     gap_ = stored_sample(info_.sample_type,
                          info_.void_values.empty() ? std::numeric_limits<double>::quiet_NaN() : info_.void_values[0]);
@@ -307,10 +302,6 @@ std::string encoding_in_json(const std::string& text) {
   const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
   if (!json.is_object() || !json.contains("encoding") || !json["encoding"].is_string()) return {};
   return json["encoding"].get<std::string>();
-}
-
-std::unique_ptr<HeightSource> open_mbtiles(const std::string& path, const OpenOptions& options) {
-  return std::make_unique<TileSource>(path, "MBTiles", open_mbtiles_store(path), options);
 }
 
 std::unique_ptr<HeightSource> open_pmtiles(const std::string& path, const OpenOptions& options) {

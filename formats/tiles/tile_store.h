@@ -41,12 +41,8 @@ class TileStore {
   [[nodiscard]] virtual bool read(const TilePlace& place, std::vector<std::byte>& stored) = 0;
   /// What the file says of how elevations are packed; empty: nothing.
   [[nodiscard]] virtual std::string encoding() = 0;
-  /// Whether the file says that its rows are counted from the other side than those of its format are.
-  [[nodiscard]] virtual bool says_other_rows() { return false; }
 };
 
-/// An MBTiles file (1.3), through SQLite in the module isohf_mbtiles.so, which is loaded at the first call.
-[[nodiscard]] std::unique_ptr<TileStore> open_mbtiles_store(const std::string& path);
 /// A PMTiles archive (version 3).
 [[nodiscard]] std::unique_ptr<TileStore> open_pmtiles_store(const std::string& path);
 

@@ -6,7 +6,7 @@ ISOHF_PACKAGES_LEAN=(
   libopenexr-dev libtbb-dev libfmt-dev nlohmann-json3-dev libtomlplusplus-dev libgeographiclib-dev nettle-dev libeigen3-dev)
 ISOHF_PACKAGES_BUILD=(
   g++ cmake ninja-build pkg-config git ca-certificates
-  "${ISOHF_PACKAGES_LEAN[@]}" libsqlite3-dev libopenimageio-dev libproj-dev libnetcdf-dev
+  "${ISOHF_PACKAGES_LEAN[@]}" libopenimageio-dev libproj-dev libnetcdf-dev
   libepoxy-dev libglfw3-dev libegl-dev libgl-dev libegl1 libgl1-mesa-dri
   libgtest-dev libgmock-dev libbenchmark-dev
   gnuplot-nox unzip zip xvfb xauth xdotool python3-jsonschema)

@@ -208,9 +208,6 @@ TEST(ReaderCases, HaveAFileForEveryNativeFormat) {
 #ifndef ISOHF_WITH_NETCDF
     if (std::string(format.name) == "netCDF-4") continue;
 #endif
-#ifndef ISOHF_WITH_MBTILES
-    if (std::string(format.name) == "MBTiles") continue;
-#endif
     EXPECT_EQ(covered.count(format.name), 1U) << format.name;
   }
 }

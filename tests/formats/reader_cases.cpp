@@ -263,10 +263,6 @@ std::vector<ReaderCase> reader_cases() {
   cases.push_back({"Netcdf4", "a.nc", read_file(data + "lat_lon.nc"), open_netcdf4, {}});
   cases.back().share = 100;
 #endif
-#ifdef ISOHF_WITH_MBTILES
-  cases.push_back({"Mbtiles", "a.mbtiles", read_file(data + "small.mbtiles"), open_mbtiles, {}});
-  cases.back().shortest_valid = 1;  // pages that hold nothing
-#endif
   const auto find = [&](const char* name) -> ReaderCase& {
     for (ReaderCase& each : cases) {
       if (each.name == name) return each;

@@ -195,6 +195,8 @@ TEST(OpenSource, NamesTheCommandThatConvertsARasterOfAnotherProgram) {
       {"seven.grd", "DSRB", "a Surfer grid"},
       {"a.jp2", std::string("\0\0\0\x0CjP  \r\n\x87\n", 12), "a JPEG 2000 picture"},
       {"a.j2k", "\xFF\x4F\xFF\x51", "a JPEG 2000 picture"},
+      {"a.mbtiles", "SQLite format 3", "an MBTiles file", "pmtiles convert"},
+      {"tiles.db", "SQLite format 3" + std::string(53, '\0') + "MPBX", "an MBTiles file", "pmtiles convert"},
       {"a.img", "EHFA_HEADER_TAG", "an ERDAS Imagine raster"},
   };
   for (const Row& row : rows) {

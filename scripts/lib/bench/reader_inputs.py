@@ -128,18 +128,9 @@ class Maker:
         self.add("VRT of a GeoTIFF", "land_tif.vrt", self.integers, "-of", "VRT")
         self.add("XYZ text", "land.xyz", self.text, "-of", "XYZ")
 
-    def tiles(self):
-        """Tiles of a web map of as many samples as its zoom level has each way, of the North: one band as three."""
-        side = 1024 if self.bench.options.smoke else 8192
-        edge = 20037508.342789244
-        self.add("MBTiles", "land.mbtiles", self.integers, "-of", "MBTiles", "-ot", "Byte", "-scale", *("-b", "1") * 3,
-                 "-srcwin", 0, 0, side, side // 2, "-a_srs", "EPSG:3857", "-a_ullr", -edge, edge, edge, 0, "-co", "TILE_FORMAT=PNG")
-        self.inputs["MBTiles"].samples = (side, side // 2)
-        self.inputs["MBTiles"].options = ["--encoding", "mapbox"]
+    def pictures(self):
         self.add("WebP", "land.webp", self.text, "-of", "WEBP", "-ot", "Byte", "-scale", *("-b", "1") * 3, "-co", "LOSSLESS=YES")
         self.inputs["WebP"].options = ["--encoding", "mapbox"]
-
-    def pictures(self):
         self.add("PNG, 16 bits", "land.png", self.integers, "-of", "PNG", "-ot", "UInt16")
         deflate = ["-co", "COMPRESS=DEFLATE"]
         self.add("GeoTIFF, tiles, Deflate", "tiles.tif", self.integers, "-co", "TILED=YES", *deflate, "-co", "PREDICTOR=2")
@@ -163,6 +154,5 @@ def make_inputs(bench):
     maker.compressed()
     maker.plain()
     maker.described()
-    maker.tiles()
     maker.pictures()
     return maker.inputs

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Elevations in the tiles of web maps: PMTiles, MBTiles and folders, PNG and WebP; GDAL writes the pictures and reads what isohf makes of them (a test tool here).
+"""Elevations in the tiles of web maps: PMTiles and folders, PNG and WebP; GDAL writes the pictures and reads what isohf makes of them (a test tool here).
 
 usage: tiles.py BIN_DIR
        tiles.py --small FOLDER
@@ -10,7 +10,6 @@ tests/formats/data/.
 import gzip
 import json
 import pathlib
-import sqlite3
 import struct
 import sys
 
@@ -129,29 +128,6 @@ def pmtiles(tiles, kind=2, packing=2, leaf=None, metadata=None):
     return header + root + text + leaves + data
 
 
-def mbtiles(path, tiles, metadata=None, views=False, page=4096):
-    path.unlink(missing_ok=True)
-    base = sqlite3.connect(path)
-    base.execute(f"PRAGMA page_size={page}")
-    base.execute("CREATE TABLE metadata (name text, value text)")
-    base.executemany("INSERT INTO metadata VALUES (?, ?)", (metadata or {}).items())
-    rows = [(z, x, (1 << z) - 1 - y, stored) for (z, x, y), stored in tiles.items()]
-    if views:  # equal pictures stored once
-        base.execute("CREATE TABLE map (zoom_level integer, tile_column integer, tile_row integer, tile_id text)")
-        base.execute("CREATE TABLE images (tile_data blob, tile_id text)")
-        base.executemany("INSERT INTO map VALUES (?, ?, ?, ?)", [(z, x, y, str(hash(s))) for z, x, y, s in rows])
-        base.executemany("INSERT INTO images VALUES (?, ?)", {(s, str(hash(s))) for *_, s in rows})
-        base.execute("CREATE VIEW tiles AS SELECT map.zoom_level AS zoom_level, map.tile_column AS tile_column, "
-                     "map.tile_row AS tile_row, images.tile_data AS tile_data FROM map JOIN images ON images.tile_id = map.tile_id")
-    else:
-        base.execute("CREATE TABLE tiles (zoom_level integer, tile_column integer, tile_row integer, tile_data blob)")
-        base.executemany("INSERT INTO tiles VALUES (?, ?, ?, ?)", rows)
-        base.execute("CREATE UNIQUE INDEX tile_index ON tiles (zoom_level, tile_column, tile_row)")
-    base.commit()
-    base.close()
-    return path
-
-
 def folder_of(root, tiles, ending):
     for (zoom, column, row), stored in tiles.items():
         path = root / str(zoom) / str(column) / f"{row}.{ending}"
@@ -207,27 +183,21 @@ def read(isohf, folder):
                     isohf.holds(path, plain, 9, encoding)
             (folder / "w.pmtiles").write_bytes(pmtiles(small, 4))
             isohf.holds(folder / "w.pmtiles", small, 9, encoding)
-            for views in (False, True):
-                isohf.holds(mbtiles(folder / "a.mbtiles", plain, views=views), plain, 9, encoding)
-                isohf.holds(mbtiles(folder / "w.mbtiles", small, views=views), small, 9, encoding, "--encoding", encoding)
+            isohf.holds(folder / "w.pmtiles", small, 9, encoding, "--encoding", encoding)
     plain = tiles_of(HOLES, "mapbox")
     path = folder / "z.pmtiles"
     path.write_bytes(pmtiles(plain))
-    for source in (path, mbtiles(folder / "z.mbtiles", plain)):
-        isohf.holds(source, plain, 8, "mapbox", "--part", "8", "--encoding", "mapbox")
-        for part in ("7", "10", "x", "-1", "99999999999", "8 "):
-            isohf.refuses("has no zoom level", "convert", source, "-o", folder / "n.isohf", "--part", part)
-        isohf.refuses("has no channels but packed", "convert", source, "-o", folder / "n.isohf", "--channel", "R")
+    isohf.holds(path, plain, 8, "mapbox", "--part", "8", "--encoding", "mapbox")
+    for part in ("7", "10", "x", "-1", "99999999999", "8 "):
+        isohf.refuses("has no zoom level", "convert", path, "-o", folder / "n.isohf", "--part", part)
+    isohf.refuses("has no channels but packed", "convert", path, "-o", folder / "n.isohf", "--channel", "R")
     # Tiles of the sea alone look like nothing; what the file says counts.
     large = tiles_of(BLOCK, "mapbox", 512)
     sea = {place: picture(packed(numpy.full((64, 64), 100000), "mapbox")[0]) for place in BLOCK}
     (folder / "sea.pmtiles").write_bytes(pmtiles(sea))
     isohf.refuses("--encoding", "convert", folder / "sea.pmtiles", "-o", folder / "n.isohf")
-    for source in ((folder / "s.pmtiles", {"encoding": "mapbox"}), (folder / "s.mbtiles", {"encoding": "mapbox"}),
-                   (folder / "t.mbtiles", {"json": '{"encoding": "mapbox"}'})):
-        path, metadata = source
-        path.write_bytes(pmtiles(sea, metadata=metadata)) if path.suffix == ".pmtiles" else mbtiles(path, sea, metadata)
-        check(isohf.run("convert", path, "-o", folder / "s.isohf", "--overwrite", "-q").returncode == 0, f"{path.name}: its encoding is not taken")
+    (folder / "s.pmtiles").write_bytes(pmtiles(sea, metadata={"encoding": "mapbox"}))
+    check(isohf.run("convert", folder / "s.pmtiles", "-o", folder / "s.isohf", "-q").returncode == 0, "s.pmtiles: its encoding is not taken")
     (folder / "l.pmtiles").write_bytes(pmtiles(large))
     isohf.holds(folder / "l.pmtiles", large, 9, "mapbox", side=512)
     runs = {place: sea[BLOCK[0]] for place in [(6, x, y) for x in range(64) for y in range(64)]}
@@ -244,30 +214,6 @@ def folders(isohf, folder):
     folder_of(folder / "rim", rim, "png")
     said = isohf.run("info", folder / "rim/9/266/180.png", "--encoding", "mapbox").stderr
     check("rim of their neighbours'" in said, f"a tile with a rim: {said}")
-
-
-def as_gdal(isohf, folder):
-    """Against GDAL's own reader and writer of MBTiles."""
-    step = 2 * HALF_MAP / (256 << 9)
-    tiles = tiles_of(BLOCK, "mapbox")
-    raster = gdal.GetDriverByName("MEM").Create("", 768, 768, 3, gdal.GDT_Byte)
-    raster.SetGeoTransform((266 * 256 * step - HALF_MAP, step, 0, HALF_MAP - 180 * 256 * step, 0, -step))
-    raster.SetSpatialRef(system())
-    for place in BLOCK:
-        bands = packed(codes(*place, 256), "mapbox")[0]
-        for i in range(3):
-            raster.GetRasterBand(i + 1).WriteArray(bands[i], (place[1] - 266) * 256, (place[2] - 180) * 256)
-    gdal.GetDriverByName("MBTiles").CreateCopy(str(folder / "g.mbtiles"), raster, options=["TILE_FORMAT=PNG"])
-    isohf.holds(folder / "g.mbtiles", tiles, 9, "mapbox")
-    ours = gdal.Open(str(mbtiles(folder / "o.mbtiles", tiles, {"format": "png", "bounds": "-180,-85,180,85"})))
-    check(ours is not None, "GDAL does not read what the test writes")
-
-
-def system():
-    from osgeo import osr
-    made = osr.SpatialReference()
-    made.ImportFromEPSG(3857)
-    return made
 
 
 def refused(isohf, folder):
@@ -293,39 +239,6 @@ def refused(isohf, folder):
     says("258 x 258", "rim.pmtiles", pmtiles(tiles_of(BLOCK, "mapbox", 258)))
     mixed = {**tiles, BLOCK[4]: tiles_of([BLOCK[4]], "mapbox", 128)[BLOCK[4]]}
     says("256 each way", "mixed.pmtiles", pmtiles(mixed))
-    for name, stored in (("j.mbtiles", jpeg), ("v.mbtiles", outlines), ("l.mbtiles", lossy), ("mixed.mbtiles", mixed)):
-        mbtiles(folder / name, stored)
-        isohf.refuses("tile 9/", "convert", folder / name, "-o", folder / "n.isohf", "--encoding", "mapbox")
-    base = sqlite3.connect(folder / "other.mbtiles")
-    base.execute("CREATE TABLE features (name text)")
-    base.commit()
-    base.close()
-    isohf.refuses("none of tiles", "info", folder / "other.mbtiles")
-    isohf.refuses("scheme xyz", "convert", mbtiles(folder / "xyz.mbtiles", tiles, {"encoding": "mapbox", "scheme": "xyz"}), "-o",
-                  folder / "n.isohf", "--strict")
-    isohf.refuses("holds no tiles", "info", mbtiles(folder / "empty.mbtiles", {}))
-    isohf.refuses("must be from 0 to", "info", mbtiles(folder / "far.mbtiles", {(3, 9, 2): tiles[BLOCK[0]]}))
-    stored = mbtiles(folder / "g.mbtiles", tiles).read_bytes()
-    says("", "cut.mbtiles", stored[:len(stored) // 2])
-    # Views that make much of nothing: rows without end, rows of every pair, long texts, views of views.
-    made = "SELECT 3 AS zoom_level, {} AS tile_column, 0 AS tile_row, {} AS tile_data FROM {}"
-    digits = "CREATE TABLE n (x); INSERT INTO n VALUES (0), (1), (2), (3), (4), (5), (6), (7), (8), (9);"
-    doubled = "CREATE VIEW v0 AS " + made.format(1, "x'00'", "n") + ";" + "".join(
-        f"CREATE VIEW v{i} AS SELECT * FROM v{i - 1} UNION ALL SELECT * FROM v{i - 1};" for i in range(1, 40))
-    endless = "WITH RECURSIVE c (x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) "
-    for name, schema in (("endless", endless + made.format("x % 8", "x'00'", "c")), ("pairs", made.format("n0.x", "x'00'", ", ".join(f"n n{i}" for i in range(12)))),
-                         ("long", made.format(1, "zeroblob(60000000)", "n")), ("doubled", "SELECT * FROM v39")):
-        base = sqlite3.connect(folder / f"{name}.mbtiles")
-        base.executescript(digits + doubled + "CREATE VIEW tiles AS " + schema)
-        base.close()
-        isohf.refuses("not authorized to use function" if name == "long" else "more work of a question than tiles do", "info", folder / f"{name}.mbtiles")
-    # What a program has open in the journal beside it is part of the file.
-    writer = sqlite3.connect(mbtiles(folder / "wal.mbtiles", {place: tiles[place] for place in BLOCK[:8]}))
-    writer.execute("PRAGMA journal_mode=WAL")
-    writer.execute("INSERT INTO tiles VALUES (9, ?, ?, ?)", (BLOCK[8][1], 511 - BLOCK[8][2], tiles[BLOCK[8]]))
-    writer.commit()
-    isohf.holds(folder / "wal.mbtiles", tiles, 9, "mapbox")
-    writer.close()
 
 
 def write_small(folder):
@@ -334,14 +247,13 @@ def write_small(folder):
     tiles = tiles_of(places, "mapbox", 8)
     (folder / "small.pmtiles").write_bytes(pmtiles(tiles, metadata={"encoding": "mapbox"}, leaf=1))
     (folder / "small.webp").write_bytes(webp(packed(codes(*places[0], 8), "mapbox")[0]))
-    mbtiles(folder / "small.mbtiles", tiles, {"encoding": "mapbox"}, page=512)
 
 
 def main():
     if len(sys.argv) == 3 and sys.argv[1] == "--small":
         write_small(pathlib.Path(sys.argv[2]))
         return 0
-    return run_parts((read, folders, as_gdal, refused), __doc__, Tiles)
+    return run_parts((read, folders, refused), __doc__, Tiles)
 
 
 if __name__ == "__main__":
