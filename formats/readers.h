@@ -81,7 +81,7 @@ namespace isohf {
 
 /// A variable of two dimensions (those before of one value, columns first or last) in a netCDF file of the classic
 /// formats, which options.channel names, else the first; coordinates that are evenly spaced place it, "crs_wkt" or
-/// "spatial_ref" of its grid mapping say where, degrees without one are on WGS 84. Also GMT's grids of before CF. _FillValue and missing_value
+/// "spatial_ref" of its grid mapping say where, degrees without one are on WGS 84. _FillValue and missing_value
 /// are nodata, scale_factor and add_offset the vertical scale and offset.
 [[nodiscard]] bool looks_like_netcdf(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_netcdf(const std::string& path, const OpenOptions& options);

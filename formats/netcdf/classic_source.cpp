@@ -153,55 +153,22 @@ class NetcdfSource final : public DescribedSource {
   NetcdfSource(const std::string& path, const OpenOptions& options) : DescribedSource(path, "netCDF", path, options) {
     ClassicHeader header(*file_);
     layout_.big_endian = true;
-    if (const Variable* z = header.variable("z");
-        z != nullptr && header.variable("x_range") && header.variable("dimension")) {
-      read_gmt(header, *z);
-    } else {
-      const CfRaster raster = read_cf(header, info_, options);
-      layout_.offset_bytes = raster.variable->begin;
-      layout_.from_south = raster.from_south;
-      if (raster.by_columns) {
-        layout_.row_bytes = size_bytes(info_.sample_type);
-        layout_.column_bytes = layout_.row_bytes * static_cast<std::uint64_t>(info_.height);
-      }
-      if (raster.variable->type >= 10) {
-        layout_.stored_as = raster.variable->type == 10 ? StoredAs::kInt64 : StoredAs::kUint64;
-      }
+    if (header.variable("z") != nullptr && header.variable("x_range") && header.variable("dimension")) {
+      refuse(
+          ErrorCode::kUnsupported,
+          fmt::format("this is a GMT grid from before CF; gmt grdconvert {} OUT.nc makes a netCDF file of it", path));
+    }
+    const CfRaster raster = read_cf(header, info_, options);
+    layout_.offset_bytes = raster.variable->begin;
+    layout_.from_south = raster.from_south;
+    if (raster.by_columns) {
+      layout_.row_bytes = size_bytes(info_.sample_type);
+      layout_.column_bytes = layout_.row_bytes * static_cast<std::uint64_t>(info_.height);
+    }
+    if (raster.variable->type >= 10) {
+      layout_.stored_as = raster.variable->type == 10 ? StoredAs::kInt64 : StoredAs::kUint64;
     }
     finish(options, 0);  // GDAL looks nowhere else for the meaning of a variable
-  }
-
- private:
-  /// GMT's format of before CF: x_range, y_range, spacing, dimension, and z in one dimension from the North-West on.
-  void read_gmt(ClassicHeader& header, const Variable& z) {
-    info_.format = "GMT grid";
-    const auto pair = [&](const char* name) {
-      const Variable* const found = header.variable(name);
-      if (found == nullptr || found->dimensions.size() != 1 || header.size_of(*found, 0) != 2 ||
-          !found->sample_type()) {
-        refuse(ErrorCode::kCorrupt, fmt::format("has no {} of two numbers", name));
-      }
-      const std::vector<double> both = header.numbers(*found, 0, 2);
-      return std::pair(both[0], both[1]);
-    };
-    const auto [columns, rows] = pair("dimension");
-    set_size(columns, rows);
-    const auto [west, east] = pair("x_range");
-    const auto [south, north] = pair("y_range");
-    if (!z.sample_type()) refuse(ErrorCode::kUnsupported, fmt::format("z has samples of the type {}", z.type));
-    info_.sample_type = *z.sample_type();
-    layout_.offset_bytes = z.begin;
-    const bool is_area = z.number("node_offset").value_or(0.0) != 0.0;
-    const double less = is_area ? 0.0 : 1.0;
-    const double dx = (east - west) / (columns - less);
-    const double dy = (north - south) / (rows - less);
-    const double half = is_area ? 0.0 : 0.5;
-    place_by_corner(west - half * dx, north + half * dy, dx, dy);
-    if (!is_area) info_.georeference.registration = Registration::kPoint;
-    set_scale(z.number("scale_factor").value_or(1.0), z.number("add_offset").value_or(0.0), "scale_factor");
-    if (lower_case(header.variable("x_range")->text("units")).find("degree") != std::string::npos) {
-      info_.georeference.unit = HorizontalUnit::kDegree;
-    }
   }
 };
 

@@ -171,6 +171,16 @@ TEST_F(Netcdf, LongitudesMayComeBeforeLatitudes) {
   EXPECT_THAT(values_of(source->info().sample_type, read_window(*source, {1, 1, 2, 1})), ElementsAre(3, 5));
 }
 
+TEST_F(Netcdf, GmtGridsFromBeforeCfAreRefusedWithTheCommandThatConvertsThem) {
+  NetcdfBytes file;
+  file.dimension("side", 2).dimension("xysize", 6);
+  file.variable("x_range", {0}, 6, stored<double>({0.0, 2.0}, true), {});
+  file.variable("dimension", {0}, 4, stored<std::int32_t>({3, 2}, true), {});
+  write("a.grd", file.variable("z", {1}, 5, std::string(24, '\1'), {}).bytes());
+  EXPECT_THAT(failure("a.grd"),
+              HasSubstr("a GMT grid from before CF; gmt grdconvert " + folder_ / "a.grd" + " OUT.nc"));
+}
+
 TEST_F(Netcdf, CoordinatesOfFloat32MayBeRounded) {
   const auto grid = [](double step, double jitter) {
     std::vector<float> longitudes;
