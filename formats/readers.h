@@ -91,9 +91,9 @@ namespace isohf {
 [[nodiscard]] bool looks_like_hdf5(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_netcdf4(const std::string& path, const OpenOptions& options);
 
-/// A GDAL virtual raster (VRT): rectangles of other files, read by whichever reader knows them, side by side and over
-/// each other (SimpleSource, ComplexSource with NODATA, ScaleOffset and ScaleRatio). At most 16 files are open at once.
-/// Warped, derived and raw ones, and sources that would be resampled, are refused.
+/// A GDAL virtual raster (VRT) as gdalbuildvrt writes it: whole files, read by whichever reader knows them, side by side
+/// and over each other (SimpleSource, ComplexSource with NODATA). At most most_open_rasters() files are open at once.
+/// Any other is refused.
 [[nodiscard]] bool looks_like_vrt(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_vrt(const std::string& path, const OpenOptions& options);
 

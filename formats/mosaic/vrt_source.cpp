@@ -27,6 +27,7 @@
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "formats/tiff/gdal_tags.h"
+#include "isohf/base/file.h"
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -34,42 +35,26 @@
 namespace isohf {
 namespace {
 
+constexpr std::size_t kHeadBytes = 512;
 constexpr std::uint64_t kLongestVrt = std::uint64_t{256} << 20U;
 constexpr std::int64_t kMostSide = std::int64_t{1} << 31;
 /// Strips are as large as the blocks say that a VRT states of its sources, up to here, and to so many times what may be
 /// kept: a claim, which nothing is held against.
 constexpr std::uint64_t kMostClaimedBytes = std::uint64_t{64} << 20U;
 constexpr std::uint64_t kStripsOfLimit = 8;
-/// A VRT of VRTs of ...; more go round in a circle.
-constexpr int kDeepest = 8;
 /// Of a sample: places in a VRT are written in decimals.
 constexpr double kOnTheGrid = 1e-3;
 
-thread_local int depth = 0;
-
-/// In a VRT within what `outer` counts, on whatever thread.
-class Deeper {
- public:
-  explicit Deeper(int outer) : before_(std::exchange(depth, outer + 1)) {}
-  ~Deeper() { depth = before_; }
-  Deeper(const Deeper&) = delete;
-  Deeper& operator=(const Deeper&) = delete;
-
- private:
-  int before_;
-};
-
-/// A rectangle of one file, and where it lies in the mosaic.
+/// A file, and where it lies in the mosaic.
 struct Piece {
   std::string path;
   std::int64_t band = 1;
-  std::optional<SampleType> type;  ///< as the VRT says
-  Window from;                     ///< of the file
+  std::string type;  ///< of its samples, as the VRT says; empty: it does not
+  std::int64_t columns = 0;
+  std::int64_t rows = 0;
   std::int64_t column = 0;
   std::int64_t row = 0;
   std::optional<double> skipped;  ///< of its values, which let what lies beneath through
-  double scale = 1.0;
-  double offset = 0.0;
 };
 
 /// What a window takes from a piece.
@@ -86,7 +71,6 @@ class VrtSource final : public FileSource {
  public:
   VrtSource(const std::string& path, const OpenOptions& options)
       : FileSource(path, "VRT", options), unpacked_bytes_(options.unpacked_bytes) {
-    if (depth >= kDeepest) fail(ErrorCode::kUnsupported, "is one of itself, or of too many within each other");
     std::string text(static_cast<std::size_t>(std::min(file_->size_bytes(), kLongestVrt + 1)), '\0');
     if (text.size() > kLongestVrt) fail(ErrorCode::kUnsupported, "is larger than 256 MiB");
     file_->read(0, std::as_writable_bytes(std::span(text)));
@@ -121,7 +105,7 @@ class VrtSource final : public FileSource {
   };
 
   [[noreturn]] void refuse(const std::string& what) const {
-    fail(ErrorCode::kUnsupported, what + "; gdal_translate makes a GeoTIFF of it");
+    fail(ErrorCode::kUnsupported, fmt::format("{}; gdal_translate {} OUT.tif makes a GeoTIFF of it", what, info_.path));
   }
 
   double number(const pugi::xml_node& node, const char* attribute, std::optional<double> otherwise = {}) const {
@@ -184,7 +168,6 @@ class VrtSource final : public FileSource {
     }
     info_.block_width = info_.width;
     type_ = info_.sample_type;
-    tell_narrow_type();
     if (info_.void_values.empty() && options.void_values.empty() && !is_floating(type_) && has_gaps()) {
       const MosaicSamples samples = choose_mosaic_samples({SampleKind::of(info_)}, true, nullptr);
       info_.sample_type = samples.kind.type;
@@ -202,8 +185,7 @@ class VrtSource final : public FileSource {
     arrange();
   }
 
-  /// By the name that GDAL has for a type; nullopt where isohf has none for it.
-  static std::optional<SampleType> type_called(std::string_view name) {
+  void read_type(const pugi::xml_node& band) {
     static constexpr std::array<std::pair<std::string_view, SampleType>, 8> kTypes = {
         {{"Byte", SampleType::kUint8},
          {"Int8", SampleType::kInt8},
@@ -213,63 +195,30 @@ class VrtSource final : public FileSource {
          {"Int32", SampleType::kInt32},
          {"Float32", SampleType::kFloat32},
          {"Float64", SampleType::kFloat64}}};
-    const auto* const found = std::ranges::find(kTypes, name, &std::pair<std::string_view, SampleType>::first);
-    return found == kTypes.end() ? std::nullopt : std::optional(found->second);
-  }
-
-  void read_type(const pugi::xml_node& band) {
     const std::string name = band.attribute("dataType").as_string("Byte");
-    const std::optional<SampleType> type = type_called(name);
-    if (!type) refuse("has samples of the type " + printable(name));
-    info_.sample_type = *type;
-    if (type != SampleType::kUint8) return;
+    const auto* const found = std::ranges::find(kTypes, name, &std::pair<std::string_view, SampleType>::first);
+    if (found == kTypes.end()) refuse("has samples of the type " + printable(name));
+    for (const Piece& piece : pieces_) {
+      if (piece.type.empty() || piece.type == name) continue;
+      refuse(fmt::format("has samples of {}, those of {} are {}", name, piece.path, printable(piece.type)));
+    }
+    info_.sample_type = found->second;
+    if (info_.sample_type != SampleType::kUint8) return;
     const auto structure = band.find_child_by_attribute("Metadata", "domain", "IMAGE_STRUCTURE");
     const auto sign = structure.find_child_by_attribute("MDI", "key", "PIXELTYPE");
-    has_signed_bytes_ = std::string_view(sign.text().get()) == "SIGNEDBYTE";
-    if (!pieces_.empty()) {
-      if (const auto first = type_in(pieces_.front())) pieces_.front().type = first;
-      has_signed_bytes_ |= pieces_.front().type == SampleType::kInt8;  // gdalbuildvrt does not say so
+    // gdalbuildvrt does not say so.
+    if (std::string_view(sign.text().get()) == "SIGNEDBYTE" || has_signed_source()) {
+      info_.sample_type = SampleType::kInt8;
     }
-    if (has_signed_bytes_) info_.sample_type = SampleType::kInt8;
   }
 
-  /// What the samples of a source are; nullopt where it cannot be opened, which is told when it is read.
-  [[nodiscard]] std::optional<SampleType> type_in(const Piece& piece) const {
+  /// Whether the first source has signed bytes; one that cannot be opened is reported when it is read.
+  [[nodiscard]] bool has_signed_source() const {
     try {
-      const Deeper deeper(depth);
-      return open(piece)->info().sample_type;
+      return !pieces_.empty() && open(pieces_.front())->info().sample_type == SampleType::kInt8;
     } catch (const Error&) {
-      return std::nullopt;
+      return false;
     }
-  }
-
-  /// Of a source whose type holds numbers that the VRT's does not. What a VRT says of its sources is believed; of those
-  /// of which it says nothing the first is opened.
-  void tell_narrow_type() {
-    bool has_looked = false;
-    for (const Piece& piece : pieces_) {
-      std::optional<SampleType> type = piece.type;
-      if (!type && !std::exchange(has_looked, true)) type = type_in(piece);
-      // GDAL calls signed bytes bytes as well.
-      if (has_signed_bytes_ && type == SampleType::kUint8 && &piece != &pieces_.front()) continue;
-      if (!type || holds(*type)) continue;
-      info_.warnings.push_back(loss(fmt::format(
-          "its samples are {}, those of {} {}: numbers that {} does not hold are clamped or rounded, as its dataType "
-          "says; another one, or the files themselves as the input, keep them",
-          to_string(type_), one_line(piece.path), to_string(*type), to_string(type_))));
-      return;
-    }
-  }
-
-  /// Whether the VRT's type has all numbers of another.
-  [[nodiscard]] bool holds(SampleType other) const {
-    SourceInfo of;
-    std::vector<SampleKind> kinds;
-    for (const SampleType type : {type_, other}) {
-      of.sample_type = type;
-      kinds.push_back(SampleKind::of(of));
-    }
-    return choose_mosaic_samples(kinds, false, nullptr).kind.type == type_;
   }
 
   void read_system(const pugi::xml_node& root) {
@@ -290,7 +239,8 @@ class VrtSource final : public FileSource {
     const std::string_view kind = node.name();
     if (!kind.ends_with("Source")) return;
     if (kind != "SimpleSource" && kind != "ComplexSource") refuse(fmt::format("has a {}", printable(kind)));
-    for (const char* calculated : {"LUT", "Exponent", "ColorTableComponent", "OpenOptions"}) {
+    for (const char* calculated :
+         {"LUT", "Exponent", "ColorTableComponent", "OpenOptions", "ScaleOffset", "ScaleRatio"}) {
       if (node.child(calculated)) refuse(fmt::format("has a {} with {}", kind, calculated));
     }
     const pugi::xml_node file = node.child("SourceFilename");
@@ -311,27 +261,24 @@ class VrtSource final : public FileSource {
     piece.band = static_cast<std::int64_t>(band_number);
     const pugi::xml_node from = node.child("SrcRect");
     const pugi::xml_node to = node.child("DstRect");
-    const auto width = static_cast<double>(info_.width);
-    const auto height = static_cast<double>(info_.height);
     piece.column = whole(to, "xOff", 0.0);
     piece.row = whole(to, "yOff", 0.0);
-    piece.from = {whole(from, "xOff", 0.0), whole(from, "yOff", 0.0), whole(from, "xSize", width),
-                  whole(from, "ySize", height)};
-    if (to && (whole(to, "xSize", width) != piece.from.columns || whole(to, "ySize", height) != piece.from.rows)) {
-      refuse(fmt::format("resamples {}: {} x {} samples become {} x {}", printable(piece.path), piece.from.columns,
-                         piece.from.rows, number(to, "xSize"), number(to, "ySize")));
+    piece.columns = whole(to, "xSize", static_cast<double>(info_.width));
+    piece.rows = whole(to, "ySize", static_cast<double>(info_.height));
+    if (whole(from, "xOff", 0.0) != 0 || whole(from, "yOff", 0.0) != 0) refuse("takes a part of " + piece.path);
+    const std::int64_t columns = whole(from, "xSize", static_cast<double>(piece.columns));
+    const std::int64_t rows = whole(from, "ySize", static_cast<double>(piece.rows));
+    if (columns != piece.columns || rows != piece.rows) {
+      refuse(fmt::format("resamples {}: {} x {} samples become {} x {}", piece.path, columns, rows, piece.columns,
+                         piece.rows));
     }
-    if (kind == "ComplexSource") {
-      piece.skipped = element_number(node, "NODATA");
-      piece.scale = element_number(node, "ScaleRatio").value_or(1.0);
-      piece.offset = element_number(node, "ScaleOffset").value_or(0.0);
-    }
+    if (kind == "ComplexSource") piece.skipped = element_number(node, "NODATA");
     // A claim, which at worst costs time.
     const pugi::xml_node properties = node.child("SourceProperties");
-    piece.type = type_called(properties.attribute("DataType").value());
+    piece.type = properties.attribute("DataType").value();
     const double block = number(properties, "BlockYSize", 1.0);
-    block_rows_ = std::max(
-        block_rows_, static_cast<std::int64_t>(std::max(1.0, std::min(block, static_cast<double>(piece.from.rows)))));
+    block_rows_ = std::max(block_rows_,
+                           static_cast<std::int64_t>(std::max(1.0, std::min(block, static_cast<double>(piece.rows)))));
     pieces_.push_back(std::move(piece));
   }
 
@@ -341,8 +288,8 @@ class VrtSource final : public FileSource {
     std::iota(by_row_.begin(), by_row_.end(), std::size_t{0});
     std::ranges::stable_sort(by_row_, {}, [&](std::size_t i) { return pieces_[i].row; });
     for (const Piece& piece : pieces_) {
-      widest_ = std::max(widest_, piece.from.columns);
-      tallest_ = std::max(tallest_, piece.from.rows);
+      widest_ = std::max(widest_, piece.columns);
+      tallest_ = std::max(tallest_, piece.rows);
     }
     most_open_ = std::clamp<std::size_t>(pieces_.size(), 1, most_open_rasters());
     unpacked_bytes_ /= most_open_;
@@ -363,8 +310,6 @@ class VrtSource final : public FileSource {
 
   void compose(const Window& window, std::span<std::byte> samples) {
     fill_with(empty_, samples);
-    const Deeper deeper(depth);  // sources open and read theirs in turn
-    if (depth > kDeepest) fail(ErrorCode::kUnsupported, "is one of itself, or of too many within each other");
     std::vector<Part> parts = parts_in(window);
     for (std::size_t from = 0; from < parts.size();) {
       std::size_t bytes = 0;
@@ -392,11 +337,8 @@ class VrtSource final : public FileSource {
       part.column = piece.column;
       part.row = piece.row;
       Window& own = part.own;
-      if (overlap(part.column, own.column, own.columns, piece.from.columns, window.column, window.columns) <= 0)
-        continue;
-      if (overlap(part.row, own.row, own.rows, piece.from.rows, window.row, window.rows) <= 0) continue;
-      own.column += piece.from.column;
-      own.row += piece.from.row;
+      if (overlap(part.column, own.column, own.columns, piece.columns, window.column, window.columns) <= 0) continue;
+      if (overlap(part.row, own.row, own.rows, piece.rows, window.row, window.rows) <= 0) continue;
       parts.push_back(part);
     }
     std::ranges::sort(parts, {}, &Part::piece);
@@ -415,11 +357,7 @@ class VrtSource final : public FileSource {
       part.samples = std::span(buffer_).subspan(begin, bytes_of(part));
       begin += part.samples.size();
     }
-    const int here = depth - 1;
-    const auto read_one = [&](std::size_t i) {
-      const Deeper deeper(here);
-      parts[i].source->read_window(parts[i].own, parts[i].samples);
-    };
+    const auto read_one = [&](std::size_t i) { parts[i].source->read_window(parts[i].own, parts[i].samples); };
     // Isolated: a thread that waits here does not start on unrelated work of the caller's.
     oneapi::tbb::this_task_arena::isolate([&] { oneapi::tbb::parallel_for(std::size_t{0}, parts.size(), read_one); });
   }
@@ -428,7 +366,7 @@ class VrtSource final : public FileSource {
   [[nodiscard]] bool has_gaps() const {
     std::vector<SampleRectangle> covered;
     for (const Piece& piece : pieces_) {
-      if (!piece.skipped) covered.push_back({piece.column, piece.row, piece.from.columns, piece.from.rows});
+      if (!piece.skipped) covered.push_back({piece.column, piece.row, piece.columns, piece.rows});
     }
     std::optional<SampleRectangle> first;
     return uncovered(std::move(covered), {0, 0, info_.width, info_.height}, first) > 0;
@@ -439,6 +377,12 @@ class VrtSource final : public FileSource {
     options.unpacked_bytes = unpacked_bytes_;
     if (piece.band > 1) options.channel = fmt::format("{}", piece.band - 1);
     try {
+      std::array<std::byte, kHeadBytes> head{};
+      const std::size_t there = File(piece.path, File::Mode::kRead).read_at(0, head);
+      if (looks_like_vrt(std::span(head).first(there))) {
+        throw Error(ErrorCode::kUnsupported,
+                    piece.path + ": is a virtual raster itself; gdal_translate makes a GeoTIFF of it");
+      }
       std::unique_ptr<HeightSource> source = open_raster(piece.path, options);
       // A band called elevations was chosen, where there is one, and the VRT wants the first.
       const SourceInfo& info = source->info();
@@ -459,9 +403,9 @@ class VrtSource final : public FileSource {
     }
     std::unique_ptr<HeightSource> source = open(piece);
     const SourceInfo& info = source->info();
-    if (piece.from.column + piece.from.columns > info.width || piece.from.row + piece.from.rows > info.height) {
-      fail(ErrorCode::kCorrupt,
-           fmt::format("takes samples beyond the {} x {} of {}", info.width, info.height, printable(piece.path)));
+    if (piece.columns != info.width || piece.rows != info.height) {
+      refuse(fmt::format("takes {} x {} of the {} x {} samples of {}", piece.columns, piece.rows, info.width,
+                         info.height, piece.path));
     }
     source->limit_buffers(limit_);
     if (opened_.size() == most_open_) opened_.pop_back();
@@ -480,7 +424,7 @@ class VrtSource final : public FileSource {
     const auto out_at = [&](std::int64_t row) {
       return samples.data() + static_cast<std::size_t>((part.row + row) * window.columns + part.column) * out_size;
     };
-    const bool as_it_is = type == info_.sample_type && !piece.skipped && piece.scale == 1.0 && piece.offset == 0.0;
+    const bool as_it_is = type == info_.sample_type && !piece.skipped;
     // A value of its type, which is written with as few as 15 digits.
     const auto skips = piece.skipped ? void_value_as_stored(type, *piece.skipped) : std::nullopt;
     const double skipped = skips.value_or(0.0);
@@ -497,27 +441,27 @@ class VrtSource final : public FileSource {
           continue;
         }
         for (std::int64_t column = 0; column < part.own.columns; ++column, in += size, out += out_size) {
-          double value = static_cast<double>(number_of(stored_at<Stored>(in)));
+          const double value = static_cast<double>(number_of(stored_at<Stored>(in)));
           if (skips && (std::abs(value - skipped) <= digits || (std::isnan(value) && std::isnan(skipped)))) continue;
           if (drops_voids && std::ranges::find(voids, value) != voids.end()) {
             if (!info_.void_values.empty()) continue;
             if (nearest_sample(type_, value) != value) {
-              fail(ErrorCode::kUnsupported, printable(piece.path) +
+              fail(ErrorCode::kUnsupported, piece.path +
                                                 " has samples without an elevation, and the VRT no "
                                                 "NoDataValue for them (gdalbuildvrt -vrtnodata)");
             }
           }
-          value = value * piece.scale + piece.offset;
-          if (to_whole && std::isnan(value)) value = 0.0;
-          store(std::isnan(value) ? value : nearest_sample(type_, value), out);
+          if (type != type_ && (std::isnan(value) ? to_whole : nearest_sample(type_, value) != value)) {
+            refuse(fmt::format("has samples of {}, one of {} is {}", to_string(type_), piece.path, value));
+          }
+          store(value, out);
         }
       }
     });
   }
 
   std::uint64_t unpacked_bytes_;
-  std::uint64_t limit_ = 0;  ///< of the buffers of one source
-  bool has_signed_bytes_ = false;
+  std::uint64_t limit_ = 0;       ///< of the buffers of one source
   SampleType type_{};             ///< as the VRT has it; that of `info_` may be wider, for a void
   std::vector<std::byte> empty_;  ///< what stands where no piece is
   std::vector<Piece> pieces_;     ///< later ones lie above

@@ -201,8 +201,8 @@ constexpr const char* kVrt =
     R"(<VRTRasterBand dataType="Int32" band="1"><NoDataValue>-9</NoDataValue><SimpleSource><SourceFilename relativeToVRT="1">)"
     R"(a.npy</SourceFilename><SourceBand>1</SourceBand><SrcRect xOff="0" yOff="0" xSize="4" ySize="3"/><DstRect xOff="0" )"
     R"(yOff="0" xSize="4" ySize="3"/></SimpleSource><ComplexSource><SourceFilename relativeToVRT="1">a.npy</SourceFilename>)"
-    R"(<SourceBand>1</SourceBand><SrcRect xOff="1" yOff="0" xSize="3" ySize="3"/><DstRect xOff="3" yOff="1" xSize="3" )"
-    R"(ySize="3"/><ScaleOffset>2</ScaleOffset><ScaleRatio>3</ScaleRatio><NODATA>5</NODATA></ComplexSource></VRTRasterBand>)"
+    R"(<SourceBand>1</SourceBand><SrcRect xOff="0" yOff="0" xSize="4" ySize="3"/><DstRect xOff="3" yOff="1" xSize="4" )"
+    R"(ySize="3"/><NODATA>5</NODATA></ComplexSource></VRTRasterBand>)"
     R"(</VRTDataset>)";
 constexpr const char* kEnvi =
     "ENVI\nsamples = 4\nlines = 3\nbands = 2\nheader offset = 2\ndata type = 2\ninterleave = bip\nbyte order = 1\n"

@@ -472,25 +472,28 @@ TEST_F(Vrt, BytesHaveSignsWhereItOrTheSourceSaysSo) {
   }
 }
 
-TEST_F(Vrt, ATypeThatDoesNotHoldTheSourcesSamplesIsTold) {
+TEST_F(Vrt, WhatGdalbuildvrtDoesNotWriteIsRefusedWithACommand) {
   write("a.dat", stored<float>({1.0F, 2.5F, 300.0F, 4.0F}));
   write("a.hdr", "ENVI\nsamples = 2\nlines = 2\ndata type = 4\n");
-  const auto vrt = [&](const std::string& type, const std::string& properties) {
+  const auto vrt = [&](const std::string& type, const std::string& more, const std::string& file = "a.dat") {
     write("a.vrt", fmt::format(R"(<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="{}" band="1">)"
-                               R"(<SimpleSource><SourceFilename relativeToVRT="1">a.dat</SourceFilename>)"
-                               R"(<SourceBand>1</SourceBand>{}</SimpleSource></VRTRasterBand></VRTDataset>)",
-                               type, properties));
-    return open("a.vrt")->info().warnings;
+                               R"(<ComplexSource><SourceFilename relativeToVRT="1">{}</SourceFilename>)"
+                               R"(<SourceBand>1</SourceBand>{}</ComplexSource></VRTRasterBand></VRTDataset>)",
+                               type, file, more));
+    return failure("a.vrt");
   };
-  for (const char* properties : {"", R"(<SourceProperties DataType="Float32"/>)"}) {
-    for (const char* narrow : {"Byte", "Int16", "Int32"}) {
-      const std::vector<Warning> warnings = vrt(narrow, properties);
-      ASSERT_EQ(warnings.size(), 1U);
-      EXPECT_EQ(warnings[0].kind, Warning::Kind::kLoss);
-      EXPECT_THAT(warnings[0], HasSubstr("a.dat float32: numbers that "));
-    }
-    for (const char* wide : {"Float32", "Float64"}) EXPECT_TRUE(vrt(wide, properties).empty());
-  }
+  const std::string command = "; gdal_translate " + folder_ / "a.vrt" + " OUT.tif makes a GeoTIFF of it";
+  EXPECT_EQ(vrt("Float32", R"(<SourceProperties DataType="Float32"/>)"), "");
+  EXPECT_THAT(vrt("Int16", R"(<SourceProperties DataType="Float32"/>)"), HasSubstr("a.dat are Float32" + command));
+  EXPECT_THAT(vrt("Int16", ""), HasSubstr("a.dat is 2.5" + command));
+  EXPECT_THAT(vrt("Byte", ""), HasSubstr("a.dat is 2.5" + command));
+  EXPECT_THAT(vrt("Float32", "<ScaleRatio>2</ScaleRatio>"), HasSubstr("with ScaleRatio" + command));
+  EXPECT_THAT(vrt("Float32", R"(<SrcRect xOff="1" yOff="0" xSize="2" ySize="2"/>)"), HasSubstr("takes a part of"));
+  EXPECT_THAT(vrt("Float32", R"(<SrcRect xOff="0" yOff="0" xSize="1" ySize="2"/>)"), HasSubstr("resamples"));
+  EXPECT_THAT(vrt("Float32", R"(<SrcRect xSize="1" ySize="2"/><DstRect xSize="1" ySize="2"/>)"),
+              HasSubstr("takes 1 x 2 of the 2 x 2 samples of"));
+  EXPECT_THAT(vrt("Float32", "", "a.vrt"), HasSubstr("a.vrt: is a virtual raster itself"));
+  EXPECT_THAT(vrt("Byte", "", "a.vrt"), HasSubstr("a.vrt: is a virtual raster itself"));
 }
 
 TEST_F(Vrt, RowsFromTheSouthAreRefusedByTheirNumber) {
