@@ -142,10 +142,7 @@ SampleType sample_type_of(const TiffLayout& layout) {
     int bits;
     SampleType type;
   };
-  constexpr std::array<Row, 14> kTypes = {{{kUnsigned, 8, SampleType::kUint8},
-                                           {kUnsigned, 10, SampleType::kUint16},
-                                           {kUnsigned, 12, SampleType::kUint16},
-                                           {kUnsigned, 24, SampleType::kUint32},
+  constexpr std::array<Row, 11> kTypes = {{{kUnsigned, 8, SampleType::kUint8},
                                            {kUnsigned, 64, SampleType::kFloat64},
                                            {kSigned, 64, SampleType::kFloat64},
                                            {kUnsigned, 16, SampleType::kUint16},
@@ -166,10 +163,14 @@ SampleType sample_type_of(const TiffLayout& layout) {
       "undefined", "unsigned integer", "signed integer",        "floating-point",
       "undefined", "complex integer",  "complex floating-point"};
   const char* format = layout.sample_format < kFormats.size() ? kFormats[layout.sample_format] : "undefined";
-  throw Error(ErrorCode::kUnsupported,
-              fmt::format("the samples are {} bit {}; isohf reads integers of 8, 16, 32 and 64 bits, unsigned ones of "
-                          "10, 12 and 24, and floats of 16, 32 and 64",
-                          layout.bits_per_sample, format));
+  std::string text = fmt::format(
+      "the samples are {} bit {}; isohf reads integers of 8, 16, 32 and 64 bits and floats of 16, 32 and 64",
+      layout.bits_per_sample, format);
+  if (stored_as == kUnsigned && layout.bits_per_sample < 32) {
+    text += fmt::format(" (gdal_translate -co NBITS={} makes them so)",
+                        std::bit_ceil(std::max(8U, unsigned{layout.bits_per_sample})));
+  }
+  throw Error(ErrorCode::kUnsupported, text);
 }
 
 void require_heights(const TiffLayout& layout) {
@@ -268,8 +269,7 @@ class TiffSource final : public HeightSource {
       throw error.within(path);
     }
     apply_open_options(info_, options);
-    if (fills_no_bytes()) require_readable_bits();
-    blocks_.emplace(file_, fills_no_bytes() ? layout_of_bytes(layout_) : layout_, std::move(image), channel_);
+    blocks_.emplace(file_, layout_, std::move(image), channel_);
     describe_missing_blocks();
   }
 
@@ -289,11 +289,7 @@ class TiffSource final : public HeightSource {
 
   void read_window(const Window& window, std::span<std::byte> samples) override {
     const Window stored = turned_ ? turned(window, info_.height) : window;
-    if (fills_no_bytes()) {
-      read_bits(stored, samples);
-    } else {
-      blocks_->read(stored, samples);
-    }
+    blocks_->read(stored, samples);
     if (turned_) turn_rows(samples, static_cast<std::size_t>(window.columns) * size_bytes(info_.sample_type));
     if (layout_.bits_per_sample == 64 && layout_.sample_format != kFloating) {
       widen_whole_numbers(info_.path, layout_.sample_format == kSigned, window, samples);
@@ -342,46 +338,6 @@ class TiffSource final : public HeightSource {
     if (part.empty() || (failure == std::errc() && end == part.data() + part.size())) return page;
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: its images have numbers, from 0; there is no \"{}\"", info_.path, printable(part)));
-  }
-
-  [[nodiscard]] bool fills_no_bytes() const {
-    return layout_.bits_per_sample == 10 || layout_.bits_per_sample == 12 || layout_.bits_per_sample == 24;
-  }
-
-  void require_readable_bits() const {
-    if (layout_.samples_per_pixel == 1 && !(layout_.bits_per_sample == 24 && layout_.big_endian)) return;
-    throw Error(
-        ErrorCode::kUnsupported,
-        fmt::format("{}: the samples are {} bit integers, {}; isohf reads little-endian ones of one channel",
-                    info_.path, layout_.bits_per_sample, layout_.big_endian ? "big-endian" : "of several channels"));
-  }
-
-  /// Bits follow each other from the highest on, as GDAL has it of 24 too; rows begin at a byte.
-  void read_bits(const Window& window, std::span<std::byte> samples) {
-    const std::int64_t bits = layout_.bits_per_sample;
-    const std::int64_t first = window.column * bits / 8;
-    const std::int64_t bytes = ((window.column + window.columns) * bits + 7) / 8 - first;
-    bits_.resize(static_cast<std::size_t>(bytes * window.rows));
-    blocks_->read({first, window.row, bytes, window.rows}, bits_);
-    std::byte* out = samples.data();
-    for (std::int64_t row = 0; row < window.rows; ++row) {
-      const std::byte* in = bits_.data() + row * bytes;
-      if (bits == 24) {
-        for (std::int64_t i = 0; i < window.columns; ++i, in += 3, out += sizeof(std::uint32_t)) {
-          const auto value = static_cast<std::uint32_t>(in[0]) << 16U | static_cast<std::uint32_t>(in[1]) << 8U |
-                             static_cast<std::uint32_t>(in[2]);
-          std::memcpy(out, &value, sizeof value);
-        }
-        continue;
-      }
-      std::int64_t at = window.column * bits - first * 8;
-      for (std::int64_t i = 0; i < window.columns; ++i, at += bits, out += sizeof(std::uint16_t)) {
-        // Ten or twelve bits from an even place lie in two bytes.
-        const unsigned both = static_cast<unsigned>(in[at / 8]) << 8U | static_cast<unsigned>(in[at / 8 + 1]);
-        const auto value = static_cast<std::uint16_t>(both >> (16 - at % 8 - bits) & ((1U << bits) - 1));
-        std::memcpy(out, &value, sizeof value);
-      }
-    }
   }
 
   void place(const TiffTags& tags) {
@@ -445,7 +401,6 @@ class TiffSource final : public HeightSource {
   bool is_placed_ = false;  // by its tags, if without an origin
   bool turned_ = false;     // the stored rows run from South to North
   std::optional<TiffBlocks> blocks_;
-  std::vector<std::byte> bits_;
 };
 
 }  // namespace
