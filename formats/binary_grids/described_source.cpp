@@ -63,11 +63,6 @@ void DescribedSource::refuse(ErrorCode code, const std::string& what) const {
   throw Error(code, header_ + ": " + what);
 }
 
-void DescribedSource::refuse_type(std::string_view name, const char* key) const {
-  refuse(name.empty() ? ErrorCode::kCorrupt : ErrorCode::kUnsupported,
-         fmt::format("{} is \"{}\", which isohf does not read", key, printable(name)));
-}
-
 double DescribedSource::number(const std::string& text, const std::string& what) const {
   double value = 0.0;
   if (!read_decimal(text, value))

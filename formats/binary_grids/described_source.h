@@ -43,15 +43,6 @@ class DescribedSource : public PlainSource {
   /// A whole number from `least` on.
   [[nodiscard]] std::int64_t count(double value, const std::string& what, double least = 1.0) const;
   void set_size(double width, double height);
-  /// One of `types` by its name, for info_ and layout_.
-  template <std::size_t kCount>
-  void set_type(const std::array<std::pair<std::string_view, SampleType>, kCount>& types, std::string_view name,
-                const char* key) {
-    for (const auto& [each, type] : types) {
-      if (each == name) return static_cast<void>(info_.sample_type = type);
-    }
-    refuse_type(name, key);
-  }
   void set_void(double value);
   /// Throws Error{kCorrupt} where `scale`, which `key` gives, is 0 or one of the two is not finite.
   void set_scale(double scale, double offset, const char* key);
@@ -64,9 +55,6 @@ class DescribedSource : public PlainSource {
   void finish(const OpenOptions& options, int band = 1);
 
   std::string header_;  ///< for messages
-
- private:
-  [[noreturn]] void refuse_type(std::string_view name, const char* key) const;
 };
 
 }  // namespace isohf

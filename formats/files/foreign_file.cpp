@@ -22,13 +22,6 @@ constexpr const char* kGdal = "gdal_translate {} OUT.tif makes a GeoTIFF of it";
 constexpr const char* kRestore = "isohf restore {} OUT.tif makes a raster of it";
 constexpr const char* kUnpack = "unpack it first";
 
-/// A raster of another program.
-struct Raster {
-  const char* is;
-  bool (*found)(const std::string& path, std::string_view head);
-  const char* help = kGdal;
-};
-
 bool has_extension(const std::string& path, std::string_view extension) {
   return lower_case(path).ends_with(extension);
 }
@@ -47,14 +40,14 @@ std::string samples_of(const std::string& path) {
 }
 
 /// Whether text begins with a line of GRASS's r.in.ascii, "north: 4928000".
-bool is_grass_text(std::string_view head) {
+bool is_grass_text(const std::string& /*path*/, std::string_view head) {
   const std::string name = lower_case(trimmed(head.substr(0, head.find(':'))));
   constexpr std::array<std::string_view, 6> kNames = {"north", "south", "east", "west", "rows", "cols"};
   return name.size() < head.size() && std::ranges::find(kNames, name) != kNames.end();
 }
 
 /// Whether text begins a record of type A (USGS, Standards for Digital Elevation Models, part 2): codes in columns of six.
-bool is_usgs_dem(std::string_view head) {
+bool is_usgs_dem(const std::string& /*path*/, std::string_view head) {
   constexpr std::size_t kCodes = 144;
   constexpr std::size_t kColumn = 6;
   constexpr std::pair<int, int> kRanges[] = {{0, 9}, {1, 4}, {-9999, 99}, {-9999, 9999}};
@@ -72,49 +65,60 @@ bool is_usgs_dem(std::string_view head) {
   return true;
 }
 
+bool is_graymap(const std::string& /*path*/, std::string_view head) {
+  return head.size() > 2 && head.starts_with("P5") &&
+         std::string_view(" \t\n\v\f\r#").find(head[2]) != std::string::npos;
+}
+
+bool is_mbtiles(const std::string& path, std::string_view head) {
+  constexpr std::size_t kApplicationAt = 68;
+  return head.starts_with("SQLite format 3") &&
+         (has_extension(path, ".mbtiles") || head.substr(std::min(kApplicationAt, head.size())).starts_with("MPBX"));
+}
+
+bool is_saga(const std::string& path, std::string_view /*head*/) {
+  return has_extension(path, ".sdat") || has_extension(path, ".sgrd");
+}
+
+bool is_idrisi(const std::string& path, std::string_view /*head*/) {
+  return has_extension(path, ".rdc") || (has_extension(path, ".rst") && has_beside(path, ".rdc"));
+}
+
+bool is_roi_pac(const std::string& path, std::string_view /*head*/) {
+  return has_extension(path, ".rsc") || (has_extension(path, ".dem") && has_beside(path, ".dem.rsc"));
+}
+
+/// A raster of another program: by what its files begin with, or by more than that.
+struct Raster {
+  const char* is;
+  std::array<std::string_view, 3> begins;
+  bool (*is_one)(const std::string& path, std::string_view head) = nullptr;
+  const char* help = kGdal;
+};
+
 constexpr Raster kRasters[] = {
-    {"a JPEG 2000 picture",
-     [](const std::string&, std::string_view head) {
-       return head.starts_with("\0\0\0\x0CjP  \r\n\x87\n"sv) || head.starts_with("\xFF\x4F\xFF\x51");
-     }},
-    {"an MBTiles file",
-     [](const std::string& path, std::string_view head) {
-       return head.starts_with("SQLite format 3") &&
-              (has_extension(path, ".mbtiles") ||
-               head.substr(std::min<std::size_t>(68, head.size())).starts_with("MPBX"));
-     },
-     "pmtiles convert {} OUT.pmtiles makes a PMTiles archive of it"},
-    {"an ERDAS Imagine raster",
-     [](const std::string&, std::string_view head) { return head.starts_with("EHFA_HEADER_TAG"); }},
-    {"a SAGA grid", [](const std::string& path,
-                       std::string_view) { return has_extension(path, ".sdat") || has_extension(path, ".sgrd"); }},
-    {"an IDRISI raster",
-     [](const std::string& path, std::string_view) {
-       return has_extension(path, ".rdc") || (has_extension(path, ".rst") && has_beside(path, ".rdc"));
-     }},
-    {"a ROI_PAC raster",
-     [](const std::string& path, std::string_view) {
-       return has_extension(path, ".rsc") || (has_extension(path, ".dem") && has_beside(path, ".dem.rsc"));
-     }},
-    {"a VICAR raster", [](const std::string&, std::string_view head) { return head.starts_with("LBLSIZE="); }},
-    {"a Terragen terrain",
-     [](const std::string&, std::string_view head) { return head.starts_with("TERRAGENTERRAIN "); }},
-    {"a portable graymap",
-     [](const std::string&, std::string_view head) {
-       return head.size() > 2 && head.starts_with("P5") &&
-              std::string_view(" \t\n\v\f\r#").find(head[2]) != std::string_view::npos;
-     }},
-    {"a Surfer grid",
-     [](const std::string&, std::string_view head) {
-       return head.starts_with("DSAA") || head.starts_with("DSBB") || head.starts_with("DSRB");
-     }},
-    {"a GRASS ASCII raster", [](const std::string&, std::string_view head) { return is_grass_text(head); }},
-    {"a USGS DEM", [](const std::string&, std::string_view head) { return is_usgs_dem(head); }},
+    {"a JPEG 2000 picture", {"\0\0\0\x0CjP  \r\n\x87\n"sv, "\xFF\x4F\xFF\x51"}},
+    {"an ERDAS Imagine raster", {"EHFA_HEADER_TAG"}},
+    {"a Surfer grid", {"DSAA", "DSBB", "DSRB"}},
+    {"a VICAR raster", {"LBLSIZE="}},
+    {"a Terragen terrain", {"TERRAGENTERRAIN "}},
+    {"a portable graymap", {}, is_graymap},
+    {"an MBTiles file", {}, is_mbtiles, "pmtiles convert {} OUT.pmtiles makes a PMTiles archive of it"},
+    {"a SAGA grid", {}, is_saga},
+    {"an IDRISI raster", {}, is_idrisi},
+    {"a ROI_PAC raster", {}, is_roi_pac},
+    {"a GRASS ASCII raster", {}, is_grass_text},
+    {"a USGS DEM", {}, is_usgs_dem},
 };
 
 const Raster* raster_of(const std::string& path, std::string_view head) {
-  const auto* const found = std::ranges::find_if(kRasters, [&](const Raster& each) { return each.found(path, head); });
-  return found == std::ranges::end(kRasters) ? nullptr : found;
+  for (const Raster& raster : kRasters) {
+    if (raster.is_one != nullptr && raster.is_one(path, head)) return &raster;
+    for (const std::string_view begin : raster.begins) {
+      if (!begin.empty() && head.starts_with(begin)) return &raster;
+    }
+  }
+  return nullptr;
 }
 
 struct Signature {

@@ -182,8 +182,8 @@ struct OpenOptions {
 [[nodiscard]] std::unique_ptr<HeightSource> with_voids_treated(std::unique_ptr<HeightSource> source,
                                                                const VoidTreatment& treatment, const Job& job = {});
 
-/// Names a folder in which the modules (OpenImageIO, PROJ, netCDF-4, MBTiles) are looked for first; empty: only beside the
-/// program and in ../lib/isohf. A program calls it before it opens anything.
+/// Names a folder in which the modules (OpenImageIO, PROJ, netCDF-4) are looked for first; empty: only beside the program
+/// and in ../lib/isohf. A program calls it before it opens anything.
 void set_module_folder(const std::string& folder);
 
 }  // namespace isohf
