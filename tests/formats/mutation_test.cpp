@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -80,6 +81,11 @@ class ReaderMutation : public ::testing::TestWithParam<std::size_t> {
     try {
       const auto source = tested().open(tested().opened.empty() ? path : folder_ / tested().opened, tested().options);
       const SourceInfo& info = source->info();
+      const Georeference& place = info.georeference;
+      EXPECT_GE(std::min(info.width, info.height), 1);
+      EXPECT_TRUE(std::isfinite(info.z_scale) && info.z_scale != 0.0 && std::isfinite(info.z_offset));
+      EXPECT_TRUE(std::min(place.spacing_x, place.spacing_y) > 0.0 && std::isfinite(place.spacing_x + place.spacing_y));
+      EXPECT_TRUE(std::isfinite(place.origin_x) && std::isfinite(place.origin_y));
       read_corner(*source);
       const Window last{info.width - std::min<std::int64_t>(info.width, 64),
                         info.height - std::min<std::int64_t>(info.height, 8), std::min<std::int64_t>(info.width, 64),

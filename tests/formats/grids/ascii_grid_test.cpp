@@ -5,14 +5,12 @@
 #include <cmath>
 #include <random>
 
-#include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/rasters/every_window.h"
 #include "support/rasters/samples.h"
-#include "support/real_files.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -44,17 +42,6 @@ class AsciiGrid : public ::testing::Test {
 
   TemporaryFolder folder_;
 };
-
-TEST_F(AsciiGrid, DeliversRealFilesAsTheReferenceDoes) {
-  const auto files = real_files({".asc"});
-  if (files.empty()) GTEST_SKIP() << kNoRealFiles;
-  for (const auto& file : files) {
-    SCOPED_TRACE(file.string());
-    const auto source = open_raster(file.string(), {});
-    expect_as_reference(*source, reference_of(file));
-    EXPECT_EQ(source->info().format, "ESRI ASCII grid");
-  }
-}
 
 TEST_F(AsciiGrid, ReadsWholeNumbersAsIntegers) {
   const auto source = open(std::string(kHeader) + kNumbers);
@@ -265,52 +252,6 @@ TEST_F(AsciiGrid, FindsRowsOfALongFile) {
     ASSERT_EQ(value_at(SampleType::kInt32, pair, 0), static_cast<double>(row));
     ASSERT_EQ(value_at(SampleType::kInt32, pair, 1), static_cast<double>(-row));
   }
-}
-
-TEST_F(AsciiGrid, ReportsEveryTruncationBeforeTheLastNumber) {
-  const std::string text = std::string(kHeader) + kNumbers;
-  for (std::size_t length = 1; length < text.size(); ++length) {
-    SCOPED_TRACE(length);
-    try {
-      const auto source = open_ascii_grid(write(text.substr(0, length)), {});
-      // Every number has at least its first digit; a text may end without a line break.
-      EXPECT_GT(length, text.size() - 6);
-      EXPECT_THAT(source->info().warnings, IsEmpty());
-    } catch (const Error& error) {
-      EXPECT_LT(length, text.size() - 1);  // the last line break alone may be missing
-      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
-    }
-  }
-}
-
-TEST_F(AsciiGrid, SurvivesDamage) {
-  const std::string text = std::string(kHeader) + kNumbers;
-  std::mt19937 random(20260101);
-  int opened = 0;
-  for (int round = 0; round < 4000; ++round) {
-    std::string damaged = text;
-    for (unsigned i = 0; i <= random() % 3; ++i) {
-      const std::size_t at = random() % damaged.size();
-      switch (random() % 3) {
-        case 0:
-          damaged[at] = static_cast<char>(random() % 256);
-          break;
-        case 1:
-          damaged.erase(at, 1 + random() % 4);
-          break;
-        default:
-          damaged.insert(at, 1, "0123456789-+.,eE \nnx:"[random() % 21]);
-      }
-    }
-    try {
-      const auto source = open_ascii_grid(write(damaged), {});
-      EXPECT_EQ(values_of(*source).size(), static_cast<std::size_t>(source->info().width * source->info().height));
-      ++opened;
-    } catch (const Error& error) {
-      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
-    }
-  }
-  EXPECT_GT(opened, 100);  // many a changed digit is another valid file
 }
 
 }  // namespace

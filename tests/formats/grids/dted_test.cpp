@@ -3,16 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <random>
 
-#include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/rasters/every_window.h"
 #include "support/rasters/samples.h"
-#include "support/real_files.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -80,20 +77,6 @@ class Dted : public testing::Test {
 
   const test::TemporaryFolder folder_;
 };
-
-TEST_F(Dted, DeliversRealCellsAsTheReferenceDoes) {
-  const auto files = test::real_files({".dt0", ".dt1", ".dt2"});
-  if (files.empty()) GTEST_SKIP() << test::kNoRealFiles;
-  for (const auto& file : files) {
-    SCOPED_TRACE(file.string());
-    const auto source = open_raster(file.string(), {});
-    test::expect_as_reference(*source, test::reference_of(file));
-    EXPECT_EQ(source->info().format, "DTED");
-    EXPECT_EQ(source->info().vertical_unit, "metre");
-    EXPECT_EQ(source->info().georeference.system.body, "Earth");
-    EXPECT_TRUE(source->info().warnings.empty());
-  }
-}
 
 TEST_F(Dted, TurnsColumnsIntoRowsFromTheNorth) {
   const auto source = open_raster(write(cell()), {});
@@ -169,22 +152,6 @@ TEST_F(Dted, NamesTheColumnOfEveryDamagedRecord) {
 
 TEST_F(Dted, IgnoresWhatFollowsTheCell) {
   EXPECT_EQ(failure(cell() + "tape"), "");
-}
-
-TEST_F(Dted, SurvivesDamagedLabels) {
-  const std::string whole = cell();
-  std::mt19937 random(21);
-  test::Damaged damage;
-  const std::string alphabet = "0123456789NSEW. -\xFF";
-  for (int round = 0; round < 3000; ++round) {
-    std::string damaged = whole;
-    for (unsigned k = random() % 4; k != 4; ++k) {
-      const std::size_t at = random() % 2 == 0 ? random() % 80 : 80 + 260 + random() % 40;
-      damaged[at] = alphabet[random() % alphabet.size()];
-    }
-    damage.try_one(write(damaged), [](const std::string& path) { return open_dted(path, {}); });
-  }
-  damage.expect_both();
 }
 
 TEST_F(Dted, SaysWhichLabelIsWrong) {

@@ -2,16 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <random>
-
-#include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/rasters/every_window.h"
 #include "support/rasters/samples.h"
-#include "support/real_files.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -50,23 +46,6 @@ class HeaderGrid : public ::testing::Test {
 
   TemporaryFolder folder_;
 };
-
-TEST_F(HeaderGrid, DeliversRealFilesAsTheReferenceDoes) {
-  const auto files = real_files({".flt", ".bil"});
-  if (files.empty()) GTEST_SKIP() << kNoRealFiles;
-  for (const auto& file : files) {
-    SCOPED_TRACE(file.string());
-    const auto source = open_raster(file.string(), {});
-    expect_as_reference(*source, reference_of(file));
-    const bool has_prj = std::filesystem::exists(std::filesystem::path(file).replace_extension(".prj"));
-    EXPECT_EQ(source->info().warnings.size(), has_prj ? 0U : 1U);  // degrees that nothing declares
-    EXPECT_EQ(source->info().georeference.system.wkt.empty(), !has_prj);
-    EXPECT_EQ(source->info().georeference.unit, has_prj ? HorizontalUnit::kMetre : HorizontalUnit::kUnknown);
-    // The header stands for the grid as well.
-    const auto by_header = open_raster(std::filesystem::path(file).replace_extension(".hdr").string(), {});
-    EXPECT_EQ(read_whole(*by_header), read_whole(*source));
-  }
-}
 
 TEST_F(HeaderGrid, ReadsGtopo30) {
   write("W180N90.PRJ", "Projection    GEOGRAPHIC\nDatum         WGS84\nZunits        METERS\nUnits         DD\n");
@@ -226,35 +205,6 @@ TEST_F(HeaderGrid, WantsExactlyTheBytesOfItsHeader) {
       EXPECT_EQ(read_whole(*open(header, bytes(length))).size(), 12U);
     } else {
       EXPECT_THAT(refusal(header, bytes(length)), HasSubstr("take")) << length;
-    }
-  }
-}
-
-TEST_F(HeaderGrid, SurvivesADamagedHeader) {
-  const std::string header =
-      std::string(kSixteenBits) + "LAYOUT BIL\nTOTALROWBYTES 6\nNODATA -9999\nULXMAP 1\nULYMAP 2\nXDIM 3\nYDIM 4\n";
-  for (std::size_t length = 1; length <= header.size(); ++length) {
-    try {
-      (void)read_whole(*open(header.substr(0, length), bytes(12)));
-    } catch (const Error& error) {
-      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
-    }
-  }
-  std::mt19937 random(20260102);
-  for (int round = 0; round < 4000; ++round) {
-    std::string damaged = header;
-    for (unsigned i = 0; i <= random() % 3; ++i) {
-      const std::size_t at = random() % damaged.size();
-      if (random() % 2 == 0) {
-        damaged[at] = static_cast<char>(random() % 256);
-      } else {
-        damaged.insert(at, 1, "0123456789-+.,eE \nIMB"[random() % 21]);
-      }
-    }
-    try {
-      (void)read_whole(*open(damaged, bytes(12)));
-    } catch (const Error& error) {
-      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
     }
   }
 }

@@ -8,12 +8,10 @@
 #include <fstream>
 
 #include "formats/files/zip_archive.h"
-#include "formats/raster_reference.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/rasters/every_window.h"
 #include "support/rasters/samples.h"
-#include "support/real_files.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -61,19 +59,6 @@ ErrorCode code_of(const std::string& path, const OpenOptions& options = {}) {
   }
   ADD_FAILURE() << path << " opened";
   return ErrorCode::kCancelled;
-}
-
-TEST_F(HgtSource, DeliversRealFilesAsTheReferenceDoes) {
-  const auto files = test::real_files({".hgt", ".hgt.zip"});
-  if (files.empty()) GTEST_SKIP() << test::kNoRealFiles;
-  for (const auto& file : files) {
-    SCOPED_TRACE(file.string());
-    const auto source = open_hgt(file.string(), {});
-    test::expect_as_reference(*source, test::reference_of(file));
-    EXPECT_TRUE(source->info().warnings.empty());
-    EXPECT_EQ(source->info().georeference.system.vertical_datum, "EGM96");
-    EXPECT_EQ(source->info().vertical_unit, "metre");
-  }
 }
 
 TEST_F(HgtSource, TakesTheCornerFromTheName) {

@@ -3,16 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <random>
 
 #include "formats/files/zip_archive.h"
-#include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/rasters/samples.h"
-#include "support/real_files.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -60,24 +57,6 @@ class Npy : public testing::Test {
 
   const test::TemporaryFolder folder_;
 };
-
-TEST_F(Npy, DeliversARealArray) {
-  const auto file = test::real_data() / "derived" / "gale.npy";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << test::kNoRealFiles;
-  const auto source = open_raster(file.string(), {});
-  const auto ref = test::reference_of(file);
-  EXPECT_EQ(source->info().width, ref.at("width").get<int>());
-  EXPECT_EQ(source->info().height, ref.at("height").get<int>());
-  EXPECT_EQ(source->info().format, "NumPy");
-  EXPECT_FALSE(source->info().georeference.has_origin);
-  const auto raw = test::read_whole(*source);
-  for (const char* list : {"pixels", "corners"}) {
-    for (const auto& pixel : ref.at(list)) {
-      const auto at = static_cast<std::size_t>(pixel.at("row").get<int>() * 348 + pixel.at("col").get<int>());
-      EXPECT_EQ(test::value_at(SampleType::kFloat32, raw, at), pixel.at("raw").get<double>());
-    }
-  }
-}
 
 TEST_F(Npy, ReadsEveryTypeOrderAndVersion) {
   const std::pair<const char*, SampleType> types[] = {
@@ -205,38 +184,6 @@ TEST_F(Npy, PicksAnArrayOfAnArchive) {
       EXPECT_EQ(code, ErrorCode::kCorrupt) << length;
     }
   }
-}
-
-TEST_F(Npy, DeliversARealArchive) {
-  const auto file = test::real_data() / "jacksboro_fault_dem.npz";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << test::kNoRealFiles;
-  const auto source = open_raster(file.string(), {});
-  const auto ref = test::reference_of(file);
-  EXPECT_EQ(source->info().channel, "elevation");
-  EXPECT_TRUE(source->info().warnings.empty());
-  ASSERT_EQ(source->info().width, ref.at("width").get<int>());
-  ASSERT_EQ(source->info().height, ref.at("height").get<int>());
-  ASSERT_EQ(source->info().sample_type, SampleType::kInt16);
-  const auto raw = test::read_whole(*source);
-  for (const char* list : {"pixels", "corners"}) {
-    for (const auto& pixel : ref.at(list)) {
-      const auto at = static_cast<std::size_t>(pixel.at("row").get<int>() * 403 + pixel.at("col").get<int>());
-      EXPECT_EQ(test::value_at(SampleType::kInt16, raw, at), pixel.at("raw").get<double>());
-    }
-  }
-}
-
-TEST_F(Npy, SurvivesDamagedHeaders) {
-  const std::string whole = array("<i2", "(2, 3)", counting(2, false));
-  std::mt19937 random(23);
-  test::Damaged damage;
-  const std::string alphabet = "{}(),:'\"<>0123456789TFi \xFF";
-  for (int round = 0; round < 4000; ++round) {
-    std::string damaged = whole;
-    for (unsigned k = random() % 4; k != 4; ++k) damaged[6 + random() % 74] = alphabet[random() % alphabet.size()];
-    damage.try_one(write(damaged, "a.npy"), [](const std::string& path) { return open_raster(path, {}); });
-  }
-  damage.expect_both();
 }
 
 }  // namespace

@@ -6,13 +6,11 @@
 #include <array>
 #include <cmath>
 
-#include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/rasters/every_window.h"
 #include "support/rasters/samples.h"
-#include "support/real_files.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -33,24 +31,6 @@ std::string write(const TemporaryFolder& folder, const std::string& name, std::s
   for (std::size_t i = 0; i < bytes; ++i) data[i] = static_cast<char>((i * 37 + 5) & 0xbfU);
   write_file(folder / name, data);
   return folder / name;
-}
-
-TEST(RawSource, DeliversRealFilesAsTheReferenceDoes) {
-  const auto files = real_files({".r16"});
-  if (files.empty()) GTEST_SKIP() << kNoRealFiles;
-  for (const auto& file : files) {
-    SCOPED_TRACE(file.string());
-    const auto expected = reference_of(file);
-    const std::string size = std::to_string(expected.at("width").get<int>());
-    // The square that the refusal suggests is the file's.
-    const Error error = error_of([&] { (void)open_raster(file.string(), {}); });
-    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-    EXPECT_THAT(error.what(), HasSubstr("`raw` " + size + "x" + size + ":u16le"));
-    const auto source = open_raster(file.string(), raw(size + "x" + size + ":u16le"));
-    expect_as_reference(*source, expected);
-    EXPECT_EQ(source->info().georeference.registration, Registration::kUnknown);
-    EXPECT_FALSE(source->info().georeference.has_origin);
-  }
 }
 
 TEST(RawLayout, IsReadFromItsText) {

@@ -4,16 +4,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <random>
 
-#include "formats/raster_reference.h"
 #include "formats/reader_failure.h"
 #include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/rasters/every_window.h"
 #include "support/rasters/samples.h"
-#include "support/real_files.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -90,23 +87,6 @@ class Isis3 : public testing::Test {
 
   const test::TemporaryFolder folder_;
 };
-
-TEST_F(Isis3, DeliversRealCubesAsTheReferenceDoes) {
-  const auto files = test::real_files({".cub"});
-  if (files.empty()) GTEST_SKIP() << test::kNoRealFiles;
-  for (const auto& file : files) {
-    SCOPED_TRACE(file.string());
-    const auto source = open_raster(file.string(), {});
-    const auto ref = test::reference_of(file);
-    test::expect_as_reference(*source, ref);
-    const SourceInfo& info = source->info();
-    EXPECT_EQ(info.format, "ISIS3 cube");
-    EXPECT_EQ(info.georeference.unit, HorizontalUnit::kMetre);
-    EXPECT_EQ(info.georeference.system.name, ref.at("crs").at("name").get<std::string>());
-    EXPECT_EQ(info.georeference.system.body, file.filename() == "Ares4_Marth_Crater.cub" ? "Mars" : "Moon");
-    EXPECT_TRUE(info.warnings.empty());
-  }
-}
 
 TEST_F(Isis3, WindowsEqualTheWholeInEveryLayout) {
   for (const auto& [layout, tile_columns, tile_rows] : {std::tuple(kTiles, 3, 2),
@@ -208,27 +188,6 @@ TEST_F(Isis3, TakesSpecialPixelsForVoids) {
     for (const double value : kind.special) EXPECT_TRUE(test::is_void(source->info(), value)) << value;
     for (const double value : kind.plain) EXPECT_FALSE(test::is_void(source->info(), value)) << value;
   }
-}
-
-TEST_F(Isis3, SurvivesDamagedLabels) {
-  const std::string whole = label(kTiles, 1, kWord) + tiles(3, 2, 1, false);
-  const std::size_t end = whole.find("End\n") + 4;
-  std::mt19937 random(22);
-  test::Damaged damage;
-  const std::string alphabet = "=(){}<>\"'#/*,\n -+.0129EeNDXx^\x01\xFF";
-  for (int round = 0; round < 4000; ++round) {
-    std::string damaged = whole;
-    for (unsigned k = random() % 4; k != 4; ++k) {
-      const std::size_t at = random() % end;
-      if (random() % 3 == 0) {
-        damaged.erase(at, 1 + random() % 8);
-      } else {
-        damaged[at] = alphabet[random() % alphabet.size()];
-      }
-    }
-    damage.try_one(write(damaged), [](const std::string& path) { return open_isis3(path, {}); });
-  }
-  damage.expect_both();
 }
 
 TEST_F(Isis3, NamesWhatItRefuses) {
