@@ -223,7 +223,7 @@ class CfReader {
     const auto length = linear_unit(unit);
     const std::string kind = system == nullptr ? "" : system->text("grid_mapping_name");
     if (kind == "rotated_latitude_longitude" || columns.text("standard_name").starts_with("grid_")) {
-      place_rotated(system);
+      leave_out_place("its degrees are those of a rotated grid (gdalwarp turns it)");
     } else if (!wkt.empty()) {
       read_system_text(wkt, info_.path, info_);
       if (place.unit == HorizontalUnit::kMetre && length) place.metres_per_unit = length->metres;
@@ -252,29 +252,6 @@ class CfReader {
                            "(`reference_system` says what they are)",
                            printable(unit))));
     }
-  }
-
-  /// Degrees about a pole that is not the Earth's are metres of an equidistant cylindrical map about it.
-  void place_rotated(const Variable* system) {
-    const auto latitude = system == nullptr ? std::nullopt : system->number("grid_north_pole_latitude");
-    const auto longitude = system == nullptr ? std::nullopt : system->number("grid_north_pole_longitude");
-    if (!latitude || !longitude)
-      return leave_out_place("its degrees are those of a rotated grid, whose pole it does not name");
-    const std::string figure = figure_of(*system);
-    double radius = 6378137.0;
-    for (const char* name : {"earth_radius", "semi_major_axis"}) radius = system->number(name).value_or(radius);
-    read_system_text(
-        fmt::format("+proj=ob_tran +o_proj=eqc +o_lat_p={:.17g} +o_lon_p={:.17g} +lon_0={:.17g}{} +no_defs +type=crs",
-                    *latitude, system->number("north_pole_grid_longitude").value_or(0.0), *longitude + 180.0,
-                    figure.empty() ? " +datum=WGS84" : figure),
-        info_.path, info_);
-    Georeference& place = info_.georeference;
-    if (place.unit != HorizontalUnit::kMetre) return leave_out_place("its degrees are those of a rotated grid");
-    const double metres = radius * std::numbers::pi / 180.0;
-    place.spacing_x *= metres;
-    place.spacing_y *= metres;
-    place.origin_x *= metres;
-    place.origin_y *= metres;
   }
 
   void leave_out_place(const std::string& why) {
