@@ -20,7 +20,6 @@
 #include "support/rasters/place_at.h"
 #include "support/rasters/raster.h"
 #include "support/rasters/samples.h"
-#include "support/real_files.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -320,45 +319,6 @@ TEST(RasterSink, KeepsVoidScaleAndUnitInTiff) {
     EXPECT_EQ(source->info().z_offset, -11000.0);
     EXPECT_EQ(source->info().vertical_unit, "foot");
     EXPECT_EQ(source->info().metres_per_vertical_unit, 0.3048);
-  }
-}
-
-void expect_same_place(const Georeference& a, const Georeference& b) {
-  EXPECT_EQ(a.registration, b.registration);
-  EXPECT_EQ(a.unit, b.unit);
-  EXPECT_EQ(a.metres_per_unit, b.metres_per_unit);
-  EXPECT_EQ(a.spacing_x, b.spacing_x);
-  EXPECT_EQ(a.spacing_y, b.spacing_y);
-  EXPECT_EQ(a.has_origin, b.has_origin);
-  // Half a sample to the corner and back may cost a rounding in each direction.
-  EXPECT_NEAR(a.origin_x, b.origin_x, 4e-16 * std::abs(a.origin_x));
-  EXPECT_NEAR(a.origin_y, b.origin_y, 4e-16 * std::abs(a.origin_y));
-  EXPECT_EQ(a.system.epsg, b.system.epsg);
-  EXPECT_EQ(a.system.name, b.system.name);
-  EXPECT_EQ(a.system.body, b.system.body);
-  EXPECT_EQ(a.system.semi_major_axis_m, b.system.semi_major_axis_m);
-  EXPECT_EQ(a.system.inverse_flattening, b.system.inverse_flattening);
-  EXPECT_EQ(a.system.vertical_epsg, b.system.vertical_epsg);
-  EXPECT_EQ(a.system.vertical_datum, b.system.vertical_datum);
-}
-
-TEST(RasterSink, KeepsTheGeoreferenceOfRealFilesInTiff) {
-  const auto files = real_files({".tif"});
-  if (files.empty()) GTEST_SKIP() << kNoRealFiles;
-  const TemporaryFolder folder;
-  for (const auto& file : files) {
-    SCOPED_TRACE(file);
-    const SourceInfo original = open_raster(file, {})->info();
-    RasterSpec spec = spec_of(6, 4, original.sample_type);
-    spec.georeference = original.georeference;
-    spec.vertical_unit = original.vertical_unit;
-    spec.metres_per_vertical_unit = original.metres_per_vertical_unit;
-    spec.overwrite = true;
-    const std::string path = folder / "copy.tif";
-    write_raster(path, spec, noise(spec));
-    const auto source = open_raster(path, {});
-    expect_same_place(original.georeference, source->info().georeference);
-    EXPECT_EQ(original.vertical_unit, source->info().vertical_unit);
   }
 }
 

@@ -377,7 +377,7 @@ def lost_by_real_files(isohf, folder, names):
 
 # Where the two differ on purpose.
 KNOWN = {
-    "besseggen_utm.dem": "GDAL moves the grid to multiples of its spacing",
+    "besseggen_utm.dem": "is a USGS DEM, which isohf does not read",
     "ldem_4_cropped.img": "GDAL reads the label as samples; isohf refuses a single row",
     "megt90n000cb.img": "the label beside it, which GDAL wants to be given, places it",
     "megt90n000cb.lbl": "GDAL has metres of the map, isohf degrees of the label",
