@@ -170,21 +170,6 @@ TEST_F(GdalVariants, TiffSampleTypes) {
   expect_refused({"complex.tif", {"-ot", "CInt16", "-a_nodata", "none"}}, "complex integer");
 }
 
-TEST_F(GdalVariants, PlacesAndReferenceSystems) {
-  const std::vector<std::string> corners = {"-a_ullr", "10", "50", "11", "49.5", "-a_srs"};
-  const auto in = [&](const char* system) {
-    std::vector<std::string> options = corners;
-    options.emplace_back(system);
-    return options;
-  };
-  expect_same("whole.tif", {"degrees.tif", in("EPSG:4326")});
-  expect_same("whole.tif", {"heights.tif", in("EPSG:4326+5773")});
-  expect_same("whole.tif", {"mars.tif", in("ESRI:104905")});
-  expect_same("whole.tif", {"feet.tif", in("EPSG:2227")});
-  expect_same("whole.tif", {"point.tif", {"-mo", "AREA_OR_POINT=Point"}});
-  expect_same("whole.tif", {"south.tif", {"-a_ullr", "10", "49", "11", "50", "-a_srs", "EPSG:4326"}});
-}
-
 TEST_F(GdalVariants, OtherFormats) {
   for (const Variant& variant :
        std::vector<Variant>{{"a.asc", {"-of", "AAIGrid"}},
@@ -202,18 +187,6 @@ TEST_F(GdalVariants, OtherFormats) {
            {"s.asc", {"-of", "AAIGrid", "-co", "DECIMAL_PRECISION=9"}},
            {"t.cub", {"-of", "ISIS3", "-co", "TILED=YES", "-co", "BLOCKXSIZE=64", "-co", "BLOCKYSIZE=64"}}}) {
     expect_same("real.tif", variant);
-  }
-}
-
-TEST_F(GdalVariants, WhatGdalKeepsBesideSaysWhatSamplesMean) {
-  const auto scaled = [](const char* name, std::vector<std::string> options) {
-    for (const char* more : {"-a_scale", "0.1", "-a_offset", "800"}) options.emplace_back(more);
-    return Variant{name, options};
-  };
-  for (const Variant& variant :
-       {scaled("a.asc", {"-of", "AAIGrid", "-a_nodata", "-9999"}), scaled("b.bil", {"-of", "EHdr", "-a_nodata", "7"}),
-        scaled("g.dat", {"-of", "ENVI"}), scaled("h.xyz", {"-of", "XYZ"})}) {
-    expect_same("whole.tif", variant);
   }
 }
 

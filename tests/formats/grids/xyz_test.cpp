@@ -95,17 +95,6 @@ TEST_F(Xyz, MissingPointsStayVoidWhateverTheOptionSays) {
   }
 }
 
-TEST_F(Xyz, WhatGdalKeepsBesideIsRead) {
-  write_file(folder_ / "a.xyz.aux.xml",
-             "<PAMDataset><SRS>GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,298.257223563]],"
-             "PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433],AUTHORITY[\"EPSG\",\"4326\"]]</SRS>"
-             "<PAMRasterBand band=\"1\"><UnitType>ft</UnitType></PAMRasterBand></PAMDataset>");
-  const auto source = open("6 45 1\n6.5 45 2\n6 45.5 3\n6.5 45.5 4\n");
-  EXPECT_EQ(source->info().georeference.unit, HorizontalUnit::kDegree);
-  EXPECT_EQ(source->info().georeference.system.epsg, 4326);
-  EXPECT_EQ(source->info().vertical_unit, "foot");
-}
-
 TEST_F(Xyz, TheVoidValueBesideIsOneOfWholeNumbersToo) {
   write_file(folder_ / "a.xyz.aux.xml",
              "<PAMDataset><PAMRasterBand band=\"1\"><NoDataValue>3</NoDataValue></PAMRasterBand></PAMDataset>");
