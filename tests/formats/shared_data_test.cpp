@@ -291,18 +291,6 @@ TEST(SharedData, EveryFileIsReadAsItsReferenceSays) {
   }
 }
 
-TEST(SharedData, LabelTextIsNoElevation) {
-  const auto file = real_data() / "ldem_4_cropped.img";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << kNoRealFiles;
-  const auto source = open_raster(file.string(), {});
-  SourceSurvey survey(source->info(), false);
-  survey.add(read_whole(*source));
-  // The Moon's North pole lies within a kilometre of the mean radius; the text would be 10 km above it.
-  EXPECT_GT(survey.scan().range.min, 1737400.0 - 1000.0);
-  EXPECT_LT(survey.scan().range.max, 1737400.0 + 1000.0);
-  EXPECT_EQ(source->info().warnings.size(), 1U);
-}
-
 TEST(SharedData, ALabelIsReadAsItsSamplesAre) {
   const auto label = real_data() / "megt90n000cb.lbl";
   if (!std::filesystem::exists(label)) GTEST_SKIP() << kNoRealFiles;

@@ -217,20 +217,6 @@ TEST(ExrSource, WarnsWhenTheDisplayWindowDiffers) {
   EXPECT_THAT(source->info().warnings[0], HasSubstr("(0, 0) - (36, 40) is read; the display window (0, 0) - (99, 99)"));
 }
 
-TEST(ExrSource, IsPlacedByAWorldFile) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "a.exr";
-  std::filesystem::copy_file(std::string(ISOHF_SOURCE_DIR) + "/testdata/ridges_161x161_float.exr", path);
-  EXPECT_FALSE(open_raster(path, {})->info().georeference.has_origin);
-  write_file(folder / "a.erw", "0.5\n0\n0\n-0.25\n10.25\n50\n");
-  const Georeference place = open_raster(path, {})->info().georeference;
-  EXPECT_TRUE(place.has_origin);
-  EXPECT_EQ(place.origin_x, 10.25);
-  EXPECT_EQ(place.origin_y, 50.0);
-  EXPECT_EQ(place.spacing_x, 0.5);
-  EXPECT_EQ(place.spacing_y, 0.25);
-}
-
 TEST(ExrSource, PrefersElevationChannelsAndSaysSo) {
   const TemporaryFolder folder;
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
