@@ -186,12 +186,10 @@ int run(const cli::Arguments& arguments) {
   const std::optional<Options> options = parse_options(arguments);
   if (!options) return cli::kExitDone;
   static_cast<void>(cli::watch_interrupts());  // from here on
-  // A flight's pictures are looked at one by one.
-  const bool is_picture = !options->screenshot.empty() && options->action != Options::Action::kFlight;
-  for (const std::string& output : {is_picture ? options->screenshot : std::string(), options->csv, options->plot}) {
-    if (!output.empty()) cli::check_output_file(options->archives, output, options->overwrite);
+  if (!options->screenshot.empty()) {
+    cli::check_output_file(options->archives, options->screenshot, options->overwrite);
+    check_raster_target(options->screenshot, options->overwrite);
   }
-  if (is_picture) check_raster_target(options->screenshot, options->overwrite);
   if (options->action == Options::Action::kWindow) {
     run_window(*options);
     return cli::kExitDone;
@@ -201,18 +199,8 @@ int run(const cli::Arguments& arguments) {
   if (options->action == Options::Action::kProbe) return say_place(*source, *options);
   const HeadlessContext context;
   require_gl();
-  switch (options->action) {
-    case Options::Action::kScreenshot:
-      return take_screenshot(*source, *options);
-    case Options::Action::kVerify:
-      return verify(*source, *options);
-    case Options::Action::kFlight:
-      fly(*source, *options, interrupt_check());
-      return cli::kExitDone;
-    default:
-      sweep(*source, *options, interrupt_check());
-      return cli::kExitDone;
-  }
+  return options->action == Options::Action::kScreenshot ? take_screenshot(*source, *options)
+                                                         : verify(*source, *options);
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace {
 using cli::CommandLine;
 
 constexpr const char* kFooter =
-    R"(Without --screenshot, --flight, --verify, --sweep or --probe a window opens; H shows its keys.
+    R"(Without --screenshot, --verify or --probe a window opens; H shows its keys.
 
 Positions are world units of the archive from its North-West corner: x eastwards, y up, z southwards. An archive laid out
 in degrees is drawn in metres, but for x and z, which stay degrees.
@@ -30,9 +30,6 @@ textures, a third goes to tiles and two thirds to textures. Where the far distan
 the figures say so; textures get coarser. The shared vertex and index arrays, the picture and the memory-mapped archive
 come on top. Float archives are rounded for viewing to 65535 steps between their lowest and highest elevation.
 
-A flight file holds one place a line, 'seconds x y z look_x look_y look_z'; # begins a comment. Smooth curves join the
-places.
-
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 --verify found differences, 130 interrupted.
 
 Examples:
@@ -40,7 +37,6 @@ Examples:
   isohf view dem.isohf --screenshot view.png --sun 110,20 --exaggeration 1.5
   isohf view dem.isohf --date 2026-12-21 --time 15:30
   isohf view dem.isohf --probe 12000,8000 --json
-  isohf view dem.isohf --flight path.txt --frames 600 --csv frames.csv
   isohf view dem.isohf --verify
   isohf view before.isohf after.isohf --difference)";
 
@@ -78,26 +74,18 @@ std::uint64_t parse_mebibytes(const std::string& text) {
   return bytes >> 20;
 }
 
-CommandLine::Take name_ending_with(const char* ending, std::string& name) {
-  return [ending, &name](const std::string& text) {
-    if (!text.ends_with(ending)) refuse(text, std::string("a file name that ends with ") + ending);
-    name = text;
-  };
-}
-
-void add_actions(CommandLine& line, Options& options, bool& window, bool& verify, bool& sweep) {
+void add_actions(CommandLine& line, Options& options, bool& window, bool& verify) {
   line.group("Actions");
-  line.option("--screenshot", "FILE.png",
-              "Write a picture and end; with --flight one of each frame, FILE-0001.png and so on",
-              name_ending_with(".png", options.screenshot));
-  line.option("--flight", "FILE", "Fly along the path in FILE without a screen and print figures", options.flight);
+  line.option("--screenshot", "FILE.png", "Write a picture and end", [&](const std::string& text) {
+    if (!text.ends_with(".png")) refuse(text, "a file name that ends with .png");
+    options.screenshot = text;
+  });
   line.flag("--verify", "Check that archive, index arrays and shaders agree with the library", verify);
   line.option("--tiles", "A:B,C:D",
               "Verify columns A to B-1 and rows C to D-1 of tiles alone, from 0 in the North-West",
               [&](const std::string& text) { options.tiles = cli::parse_tile_range(text); });
   line.option("--every", "N", "Verify one tile in N along each row and column, one row of shadows, one block of seams",
               [&](const std::string& text) { options.every = cli::parse_whole_number(text, 1, 1000000); });
-  line.flag("--sweep", "Go from level 0 to 2 in small steps and measure how the picture changes", sweep);
   line.option("--probe", "X,Z[,X,Z]",
               "Say what is known of a place, in world units; of two also the heights between them",
               [&](const std::string& text) {
@@ -109,19 +97,11 @@ void add_actions(CommandLine& line, Options& options, bool& window, bool& verify
                 }
               });
   line.flag("--window", "Open a window even with --screenshot, which then shows the window", window);
-  line.exclusive({"--screenshot", "--verify", "--sweep", "--probe"});
-  line.exclusive({"--flight", "--verify", "--sweep", "--probe"});
-  line.exclusive({"--window", "--flight", "--verify", "--sweep", "--probe"});
-  line.option(
-      "--frames", "N", "Draw N frames of the flight (default 300), or close the window after N",
-      [&](const std::string& text) { options.frames = static_cast<int>(cli::parse_whole_number(text, 1, 10000000)); });
-  line.option("--steps", "N", "Sweep in N steps (default 80)", [&](const std::string& text) {
-    options.sweep_steps = static_cast<int>(cli::parse_whole_number(text, 4, 10000));
+  line.exclusive({"--screenshot", "--verify", "--probe"});
+  line.exclusive({"--window", "--verify", "--probe"});
+  line.option("--frames", "N", "Close the window after N frames", [&](const std::string& text) {
+    options.frames = static_cast<int>(cli::parse_whole_number(text, 1, 10000000));
   });
-  line.option("--csv", "FILE", "Write figures of each frame of the flight or step of the sweep", options.csv);
-  line.option("--plot", "FILE.svg", "Write a chart of the flight's frame times",
-              name_ending_with(".svg", options.plot));
-  line.flag("--baseline", "Measure a plain static mesh of the same triangles after the flight", options.baseline);
   line.flag("--overwrite", "Replace files that exist", options.overwrite);
 }
 
@@ -223,7 +203,6 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   Options options;
   bool window = false;
   bool verify = false;
-  bool sweep = false;
   bool no_haze = false;
   bool no_overlay = false;
   bool no_base = false;
@@ -234,7 +213,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   line.positional("ARCHIVE", "-i,--input",
                   "Archive to view, or a raster: it is converted for as long as it is looked at", archive);
   line.positionals("[SECOND]", "Another one: Tab goes to and fro between the two in the window", options.archives);
-  add_actions(line, options, window, verify, sweep);
+  add_actions(line, options, window, verify);
   add_picture(line, options);
   line.flag("--no-haze", "Leave out the haze towards the far distance", no_haze);
   line.flag("--no-base", "Leave out the block that the ground stands on, and the hatching below voids", no_base);
@@ -258,11 +237,6 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   const auto needs = [&](const char* option, bool is_met, const char* needed) {
     if (line.given(option) && !is_met) line.fail(std::string(option) + " needs " + needed);
   };
-  const bool flies = !options.flight.empty();
-  needs("--plot", flies, "--flight");
-  needs("--baseline", flies, "--flight");
-  needs("--csv", flies || sweep, "--flight or --sweep");
-  needs("--steps", sweep, "--sweep");
   needs("--legend", !options.screenshot.empty() && !window, "--screenshot without --window");
   if (options.legend && (options.view.width < kLegend_px.width || options.view.height < kLegend_px.height)) {
     line.fail(fmt::format("--legend needs pictures of at least {}x{} (--size)", kLegend_px.width, kLegend_px.height));
@@ -281,10 +255,8 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   options.overlay = !no_overlay;
   options.view.base = !no_base;
   if (!options.screenshot.empty() && !window) options.action = Options::Action::kScreenshot;
-  if (flies) options.action = Options::Action::kFlight;
   if (verify) options.action = Options::Action::kVerify;
-  if (sweep) options.action = Options::Action::kSweep;
-  needs("--frames", options.action == Options::Action::kWindow || flies, "--flight or a window");
+  needs("--frames", options.action == Options::Action::kWindow, "a window");
   if (options.archives.size() == 2 && !options.difference && options.action != Options::Action::kWindow) {
     line.fail("a second archive needs a window or --difference");
   }

@@ -14,19 +14,14 @@ namespace isohf::view {
 
 /// What the command line asks for; no file has been touched.
 struct Options {
-  enum class Action { kWindow, kScreenshot, kFlight, kVerify, kSweep, kProbe };
+  enum class Action { kWindow, kScreenshot, kVerify, kProbe };
 
   Action action = Action::kWindow;
   cli::CommonOptions common;
   std::vector<std::string> archives;  ///< one, or two to go to and fro between
   bool difference = false;            ///< colours by how far the second lies above the first
   std::string screenshot;             ///< PNG to write; with kWindow: of the window, after `frames` frames
-  std::string flight;
-  std::string csv;
-  std::string plot;
-  int frames = 0;  ///< 0: window: until closed; flight: 300
-  int sweep_steps = 80;
-  bool baseline = false;
+  int frames = 0;                     ///< 0: until the window is closed
   bool overwrite = false;
   bool overlay = true;           ///< figures on the screen
   bool legend = false;           ///< on pictures

@@ -121,13 +121,8 @@ bool reaches_beyond(const TileGrid& grid, TileIndex tile, const WorldBounds& cov
          west_north.z + grid.extent_z() > covered.z1;
 }
 
-}  // namespace
-
-DepthOrder best_depth_order() {
-  const bool can = epoxy_gl_version() >= 45 || epoxy_has_gl_extension("GL_ARB_clip_control");
-  return can ? DepthOrder::kNearIsOne : DepthOrder::kNearIsZero;
-}
-
+/// The frame's uniforms for a view: positions are relative to an anchor tile under the eye, in floats near the eye.
+/// nearest  distance from the eye within which nothing is drawn; a least share of the far distance if that is larger
 TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, double nearest, DepthOrder order) {
   const TileGrid& grid = source.grid();
   const double aspect = static_cast<double>(view.width) / view.height;
@@ -144,6 +139,13 @@ TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, doub
   const WorldBounds covered = source.covered();
   frame.covered = {covered.x0 - view.eye.x, covered.z0 - view.eye.z, covered.x1 - view.eye.x, covered.z1 - view.eye.z};
   return frame;
+}
+
+}  // namespace
+
+DepthOrder best_depth_order() {
+  const bool can = epoxy_gl_version() >= 45 || epoxy_has_gl_extension("GL_ARB_clip_control");
+  return can ? DepthOrder::kNearIsOne : DepthOrder::kNearIsZero;
 }
 
 void begin_opaque_pass(DepthOrder order) {
@@ -351,7 +353,7 @@ void Renderer::draw_opaque(Frame& frame) {
     for (const Item& item : frame.items) {
       if (item.is_rim != rim) continue;
       draw_mesh(frame, program, item, item.blend.first);
-      drawn_.push_back({item.at, item.blend.first});
+      drawn_.push_back(item.at);
     }
   }
 }
@@ -366,7 +368,6 @@ void Renderer::draw_fading(Frame& frame) {
       order_fading(item->blend, order_);
       glUniform1f(program.uniform("alpha"), static_cast<float>(item->blend.alpha));
       draw_mesh(frame, program, *item, item->blend.second);
-      drawn_.push_back({item->at, item->blend.second});
     }
   }
   end_fading_pass();

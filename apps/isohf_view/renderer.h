@@ -41,13 +41,6 @@ struct FrameFigures {
   std::int64_t passes = 0;      ///< over the terrain: opaque, fading, wires
 };
 
-/// A mesh that a frame drew: strip and stitch of a tile at a whole level of its plane.
-struct DrawnMesh {
-  PlaneTile at;
-  int level = 0;
-  friend bool operator==(const DrawnMesh&, const DrawnMesh&) = default;
-};
-
 /// Finds a tile's buffers; nullptr where the tile is not resident.
 using ResidentTile = std::function<const TileSlot*(PlaneTile)>;
 
@@ -69,8 +62,8 @@ class Renderer {
   /// Draws what the tiles of a range of the coarsest plane stand for, as far as resident, into the bound framebuffer.
   FrameFigures draw(const ViewState& view, const TileRange& top, const ResidentTile& resident);
 
-  /// What the last frame drew in its opaque and its fading pass, in order.
-  [[nodiscard]] const std::vector<DrawnMesh>& drawn() const { return drawn_; }
+  /// The tiles that the last frame drew.
+  [[nodiscard]] const std::vector<PlaneTile>& drawn() const { return drawn_; }
 
  private:
   struct Item {
@@ -119,7 +112,7 @@ class Renderer {
   Air air_;
   DepthOrder order_ = best_depth_order();
   std::map<std::tuple<ColourMode, bool, bool>, TerrainProgram> shading_;  ///< by mode, borders, rim
-  std::vector<DrawnMesh> drawn_;
+  std::vector<PlaneTile> drawn_;
   TerrainPrograms flat_;
   Program sky_;
   std::optional<Block> block_;  ///< made when first wanted
@@ -128,11 +121,6 @@ class Renderer {
   Texture palette_;
   VertexArray nothing_;
 };
-
-/// The frame's uniforms for a view: positions are told from an anchor tile under the eye, in floats near the eye.
-/// nearest  distance from the eye within which nothing is drawn; a least share of the far distance where smaller.
-[[nodiscard]] TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, double nearest = 0.0,
-                                         DepthOrder order = DepthOrder::kNearIsZero);
 
 /// The GL state of the opaque and of the fading pass; verifying draws with the same.
 void begin_opaque_pass(DepthOrder order = DepthOrder::kNearIsZero);

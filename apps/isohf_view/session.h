@@ -21,7 +21,7 @@ namespace isohf::view {
 [[nodiscard]] std::optional<CastingSun> casting_sun(double azimuth_deg, double elevation_deg, double exaggeration,
                                                     std::optional<double> softness);
 
-/// An open heightfield with a camera: all that window, picture and flight have in common. A GL context must be
+/// An open heightfield with a camera: all that window and picture have in common. A GL context must be
 /// current as long as it lives.
 class Session {
  public:
@@ -87,7 +87,6 @@ class Session {
   /// nullptr where the source has no textures.
   [[nodiscard]] const TextureBox* textures() const { return textures_ ? &*textures_ : nullptr; }
   [[nodiscard]] const TileSource& source() const { return source_; }
-  [[nodiscard]] const SharedGeometry& shared() const { return shared_; }
   [[nodiscard]] Renderer& renderer() { return renderer_; }
 
  private:

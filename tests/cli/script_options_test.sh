@@ -10,7 +10,7 @@ expect() {  # expect CODE SCRIPT ARGUMENT...
   found=$?
   ((found == code)) || { echo "$*: ended with $found, must be $code"; failed=1; }
 }
-for script in scripts/{accuracy_table,bench,check,flight,quickstart,test} scripts/dev/{faults,fuzz,soak,tsan} testdata/make_testdata; do
+for script in scripts/{accuracy_table,bench,check,quickstart,test} scripts/dev/{faults,fuzz,soak,tsan} testdata/make_testdata; do
   expect 0 "$script" --help
   [[ $script == scripts/test ]] || expect 2 "$script" --nonsense
 done
@@ -19,8 +19,6 @@ expect 2 scripts/accuracy_table --quick
 expect 2 scripts/bench nonsense
 expect 2 scripts/bench --rounds 0
 expect 2 scripts/check --fix --nonsense
-expect 2 scripts/flight --frames
-expect 2 scripts/flight --frames none
 expect 2 scripts/dev/fuzz archive soon
 expect 0 scripts/slurm/submit --help
 expect 2 scripts/slurm/submit a.plan

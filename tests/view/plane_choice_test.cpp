@@ -162,10 +162,10 @@ TEST_F(PlanePictureTest, IsAsFineNearTheEyeWhereLessIsSeen) {
     const Offscreen into(options.view.width, options.view.height, GL_RGBA8);
     session.complete_frame();
     std::set<std::pair<std::int64_t, std::int64_t>> tiles;
-    for (const DrawnMesh& mesh : session.renderer().drawn()) {
-      const double x = (static_cast<double>(mesh.at.tile.column) + 0.5) * 600.0 - 7000.0;
-      const double z = (static_cast<double>(mesh.at.tile.row) + 0.5) * 600.0 - 6000.0;
-      if (mesh.at.plane == 0 && std::hypot(x, z) < 1200.0) tiles.insert({mesh.at.tile.column, mesh.at.tile.row});
+    for (const auto& [plane, tile] : session.renderer().drawn()) {
+      const double x = (static_cast<double>(tile.column) + 0.5) * 600.0 - 7000.0;
+      const double z = (static_cast<double>(tile.row) + 0.5) * 600.0 - 6000.0;
+      if (plane == 0 && std::hypot(x, z) < 1200.0) tiles.insert({tile.column, tile.row});
     }
     return tiles;
   };

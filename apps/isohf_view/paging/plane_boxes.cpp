@@ -81,14 +81,11 @@ void PlaneBoxes::count() {
   figures_ = {};
   for (const auto& box : boxes_) {
     const TileBoxFigures& one = box->figures();
-    figures_.uploads += one.uploads;
     figures_.upload_bytes += one.upload_bytes;
     figures_.resident_tiles += one.resident_tiles;
     figures_.missing_tiles += one.missing_tiles;
     figures_.resident_bytes += one.resident_bytes;
     figures_.shadows_to_come += one.shadows_to_come;
-    figures_.shadow_uploads += one.shadow_uploads;
-    figures_.update_ms += one.update_ms;
     figures_.radius = one.radius;
     if (!error_) error_ = box->error();
   }

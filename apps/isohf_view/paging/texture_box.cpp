@@ -262,7 +262,6 @@ void TextureBox::request() {
 }
 
 void TextureBox::update(const TileRange& range, const ViewState& view, std::uint64_t upload_bytes) {
-  const auto begin = std::chrono::steady_clock::now();
   figures_.upload_bytes = 0;
   enter(range);
   decide(view);
@@ -270,7 +269,6 @@ void TextureBox::update(const TileRange& range, const ViewState& view, std::uint
   upload(upload_bytes);
   request();
   count();
-  figures_.update_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
 }
 
 void TextureBox::count() {

@@ -39,7 +39,6 @@ struct TextureBoxFigures {
   std::int64_t resident = 0;         ///< tiles with a texture on the GPU
   std::int64_t to_come = 0;          ///< tiles whose texture is not there, or not as fine as wanted
   std::uint64_t resident_bytes = 0;  ///< GPU and CPU bytes of textures: never above the bound
-  double update_ms = 0.0;            ///< that the last update took
 };
 
 /// The textures of the tiles around the camera (docs/decisions/0015), each from the mip level on that its distance asks

@@ -150,10 +150,7 @@ void TileBox::enter(Cell& cell, TileIndex tile) {
 }
 
 void TileBox::update(WorldPoint centre, double radius, bool shades) {
-  const auto begin = std::chrono::steady_clock::now();
-  figures_.uploads = 0;
   figures_.upload_bytes = 0;
-  figures_.shadow_uploads = 0;
   resize(centre, radius);
   for (std::int64_t row = range_.first_row; row <= range_.last_row; ++row) {
     for (std::int64_t column = range_.first_column; column <= range_.last_column; ++column) {
@@ -166,7 +163,6 @@ void TileBox::update(WorldPoint centre, double radius, bool shades) {
   request(centre);
   count();
   if (shades || figures_.missing_tiles == 0) request_shadows();
-  figures_.update_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
 }
 
 std::uint64_t TileBox::most_bytes_of_a_tile(const TileSource& source) {
@@ -178,10 +174,7 @@ std::uint64_t TileBox::most_bytes_of_a_tile(const TileSource& source) {
 }
 
 void TileBox::rest() {
-  figures_.uploads = 0;
   figures_.upload_bytes = 0;
-  figures_.shadow_uploads = 0;
-  figures_.update_ms = 0.0;
   loader_.collect(waiting_);
   upload();
   count();
@@ -212,7 +205,6 @@ void TileBox::upload_shadows() {
       cell.slot->upload_shadow(shadow.depths, shadow.gain);
       cell.sun_number = cast.sun_number;
       figures_.upload_bytes += depth_bytes_;
-      ++figures_.shadow_uploads;
     }
   }
   if (caster_.in_flight() == 0) sweep_bytes_ = 0;
@@ -237,7 +229,6 @@ void TileBox::place(LoadedTile& loaded) {
   cell.slot->upload(loaded.codes);
   cell.sun_number = 0;
   cell.state = State::kResident;
-  ++figures_.uploads;
   figures_.upload_bytes += loaded.codes.size() * sizeof(std::uint16_t);
 }
 

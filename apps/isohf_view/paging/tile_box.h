@@ -47,14 +47,11 @@ struct TileBoxLimits {
 
 /// What one update did, and where things stand.
 struct TileBoxFigures {
-  int uploads = 0;  ///< in this frame
-  std::uint64_t upload_bytes = 0;
+  std::uint64_t upload_bytes = 0;  ///< in this frame
   std::int64_t resident_tiles = 0;
   std::int64_t missing_tiles = 0;    ///< in the box and stored, but not resident yet
   std::uint64_t resident_bytes = 0;  ///< GPU and CPU bytes of tiles: never above memory_bytes
   std::int64_t shadows_to_come = 0;  ///< resident tiles whose shadow is not yet of the sun wanted
-  int shadow_uploads = 0;            ///< in this frame, of tiles that were there already
-  double update_ms = 0.0;            ///< that the last update took
   double radius = 0.0;               ///< world units: what was asked for, or less where memory would not do
 };
 
