@@ -8,7 +8,7 @@
 
 namespace isohf::view {
 
-/// Opens the archives and a window and lets a person fly until it is closed, or for options.frames frames; writes
+/// Opens the archive and a window and lets a person fly until it is closed, or for options.frames frames; writes
 /// options.screenshot of the last frame where asked, and with --json says where the eye stood at the end. Throws Error{kUnsupported} where no window or no OpenGL 3.3 can be had.
 void run_window(const Options& options);
 

@@ -51,9 +51,9 @@ int take_screenshot(const TileSource& source, const Options& options) {
   }
   session.keep(target, options, options.screenshot);
   print_result(options.common, "", [&] {
-    return ordered_json{{"archive", options.archives[0]}, {"screenshot", options.screenshot},
-                        {"driver", driver_name()},        {"width", target.width()},
-                        {"height", target.height()},      {"exaggeration", session.view.exaggeration},
+    return ordered_json{{"archive", options.archive}, {"screenshot", options.screenshot},
+                        {"driver", driver_name()},    {"width", target.width()},
+                        {"height", target.height()},  {"exaggeration", session.view.exaggeration},
                         {"cut", session.is_cut()}};
   });
   return cli::kExitDone;
@@ -142,8 +142,7 @@ int verify(const TileSource& source, const Options& options) {
   };
   const ViewReport report = verify_view(source, make_index_arrays(grid.shape()), wanted);
   display.clear();
-  print_result(options.common, text_from(report, options.archives[0]),
-               [&] { return json_from(report, options.archives[0]); });
+  print_result(options.common, text_from(report, options.archive), [&] { return json_from(report, options.archive); });
   return report.passed() ? cli::kExitDone : cli::kExitDifferences;
 }
 
@@ -173,7 +172,7 @@ int say_place(const TileSource& source, const Options& options) {
   cli::CommonOptions answers = options.common;
   answers.quiet = false;  // what is asked for is said
   print_result(answers, text, [&] {
-    ordered_json json{{"archive", options.archives[0]}, {"places", ordered_json::array()}};
+    ordered_json json{{"archive", options.archive}, {"places", ordered_json::array()}};
     for (const Place& place : places) json["places"].push_back(json_of(place));
     if (profile) json["profile"] = json_of(*profile);
     return json;
@@ -187,15 +186,14 @@ int run(const cli::Arguments& arguments) {
   if (!options) return cli::kExitDone;
   static_cast<void>(cli::watch_interrupts());  // from here on
   if (!options->screenshot.empty()) {
-    cli::check_output_file(options->archives, options->screenshot, options->overwrite);
+    cli::check_output_file({options->archive}, options->screenshot, options->overwrite);
     check_raster_target(options->screenshot, options->overwrite);
   }
   if (options->action == Options::Action::kWindow) {
     run_window(*options);
     return cli::kExitDone;
   }
-  const Opened opened = open_shown(options->archives[0], *options, options->difference ? options->archives[1] : "");
-  const TileSource* source = opened.source.get();
+  const std::unique_ptr<TileSource> source = open_shown(*options);
   if (options->action == Options::Action::kProbe) return say_place(*source, *options);
   const HeadlessContext context;
   require_gl();

@@ -25,15 +25,10 @@ std::filesystem::path temporary_folder() {
   return folder;
 }
 
-std::string next_path() {
-  static int number = 0;
-  return (temporary_folder() / fmt::format("isohf-view-{}-{}.isohf", ::getpid(), ++number)).string();
-}
-
 /// An archive made of a raster, which goes when this does, and with it what a conversion may leave of it.
 class ScratchArchive {
  public:
-  ScratchArchive() : path_(next_path()) {}
+  ScratchArchive() : path_((temporary_folder() / fmt::format("isohf-view-{}.isohf", ::getpid())).string()) {}
   ~ScratchArchive() {
     std::error_code ignored;
     for (const char* ending : {"", ".part", ".part.journal"}) std::filesystem::remove(path_ + ending, ignored);
@@ -52,8 +47,9 @@ bool names_options(const std::string& message) {
   return message.find('`') != std::string::npos;
 }
 
-/// Converts what is named where it is a raster; nullptr where it is none.
-std::unique_ptr<ScratchArchive> convert_for_viewing(const std::string& name, const Options& options) {
+/// Converts options.archive if it is a raster; nullptr if it is not.
+std::unique_ptr<ScratchArchive> convert_for_viewing(const Options& options) {
+  const std::string& name = options.archive;
   if (native_format_of(name, {}) == nullptr) return nullptr;
   auto scratch = std::make_unique<ScratchArchive>();
   ConvertOptions request;
@@ -83,9 +79,9 @@ std::unique_ptr<ScratchArchive> convert_for_viewing(const std::string& name, con
 }
 
 /// An archive, or what neither that nor a raster is.
-std::unique_ptr<TileSource> open_unconverted(const std::string& name, const std::string& second) {
+std::unique_ptr<TileSource> open_unconverted(const std::string& name) {
   try {
-    return open_archive(name, second);
+    return open_archive(name);
   } catch (const Error& error) {
     const bool is_called_archive = std::filesystem::path(name).extension() == ".isohf";
     if (is_called_archive || error.code() != ErrorCode::kCorrupt) throw;
@@ -99,23 +95,10 @@ std::unique_ptr<TileSource> open_unconverted(const std::string& name, const std:
 
 }  // namespace
 
-FileStamp stamp_of(const std::string& path) {
-  struct stat found {};
-  if (::stat(path.c_str(), &found) != 0) return {};
-  return {found.st_ino, found.st_size, found.st_mtim.tv_sec, found.st_mtim.tv_nsec};
-}
-
-Opened open_shown(const std::string& name, const Options& options, const std::string& second) {
-  Opened opened{name, stamp_of(name), nullptr};
+std::unique_ptr<TileSource> open_shown(const Options& options) {
   // An open file outlives its name: what is converted leaves nothing behind, however the program ends.
-  const auto shown = convert_for_viewing(name, options);
-  if (second.empty()) {
-    opened.source = shown ? open_archive(shown->path(), {}, name) : open_unconverted(name, {});
-  } else {
-    const auto other = convert_for_viewing(second, options);
-    opened.source = open_archive(shown ? shown->path() : name, other ? other->path() : second, shown ? name : "");
-  }
-  return opened;
+  const auto shown = convert_for_viewing(options);
+  return shown ? open_archive(shown->path(), options.archive) : open_unconverted(options.archive);
 }
 
 }  // namespace isohf::view

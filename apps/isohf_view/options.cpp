@@ -37,8 +37,7 @@ Examples:
   isohf view dem.isohf --screenshot view.png --sun 110,20 --exaggeration 1.5
   isohf view dem.isohf --date 2026-12-21 --time 15:30
   isohf view dem.isohf --probe 12000,8000 --json
-  isohf view dem.isohf --verify
-  isohf view before.isohf after.isohf --difference)";
+  isohf view dem.isohf --verify)";
 
 /// Below that what is written lies on itself.
 constexpr struct {
@@ -172,8 +171,6 @@ void add_picture(CommandLine& line, Options& options) {
                     kModes[cli::parse_word(text, {"elevation", "plain", "levels", "strips", "texture", "normals"})];
                 options.mode_given = true;
               });
-  line.flag("--difference", "Colour the ground by how far the second archive's lies above it, red, or below, blue",
-            options.difference);
   line.option("--palette", "NAME|FILE",
               "Colours of elevations: elevation, gray, mars (default: its body's), or a text file of elevations and "
               "colours as for gdaldem color-relief",
@@ -207,12 +204,10 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   bool no_overlay = false;
   bool no_base = false;
   std::optional<double> time;
-  std::string archive;
   CommandLine line("view", "Views an archive of an isometric heightfield, or draws and checks it without a screen.");
   line.group("Arguments");
   line.positional("ARCHIVE", "-i,--input",
-                  "Archive to view, or a raster: it is converted for as long as it is looked at", archive);
-  line.positionals("[SECOND]", "Another one: Tab goes to and fro between the two in the window", options.archives);
+                  "Archive to view, or a raster: it is converted for as long as it is looked at", options.archive);
   add_actions(line, options, window, verify);
   add_picture(line, options);
   line.flag("--no-haze", "Leave out the haze towards the far distance", no_haze);
@@ -231,9 +226,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   cli::add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
-  line.require("ARCHIVE", archive);
-  options.archives.insert(options.archives.begin(), archive);
-  if (options.archives.size() > 2) line.fail("found " + options.archives[2] + ", must be one archive, or two");
+  line.require("ARCHIVE", options.archive);
   const auto needs = [&](const char* option, bool is_met, const char* needed) {
     if (line.given(option) && !is_met) line.fail(std::string(option) + " needs " + needed);
   };
@@ -245,11 +238,9 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   needs("--every", verify, "--verify");
   needs("--time", options.date.has_value(), "--date");
   if (time) options.date->hours = *time;
-  needs("--difference", options.archives.size() == 2, "a second archive");
   if (options.position && options.look_at && *options.position == *options.look_at) {
     line.fail("--look-at is the place of --position, which gives no direction; name another place");
   }
-  if (options.difference && !options.mode_given) options.view.mode = ColourMode::kDifference;
   if (!options.probe.empty()) options.action = Options::Action::kProbe;
   options.view.haze = !no_haze;
   options.overlay = !no_overlay;
@@ -257,9 +248,6 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   if (!options.screenshot.empty() && !window) options.action = Options::Action::kScreenshot;
   if (verify) options.action = Options::Action::kVerify;
   needs("--frames", options.action == Options::Action::kWindow, "a window");
-  if (options.archives.size() == 2 && !options.difference && options.action != Options::Action::kWindow) {
-    line.fail("a second archive needs a window or --difference");
-  }
   return options;
 }
 

@@ -18,10 +18,9 @@ struct Options {
 
   Action action = Action::kWindow;
   cli::CommonOptions common;
-  std::vector<std::string> archives;  ///< one, or two to go to and fro between
-  bool difference = false;            ///< colours by how far the second lies above the first
-  std::string screenshot;             ///< PNG to write; with kWindow: of the window, after `frames` frames
-  int frames = 0;                     ///< 0: until the window is closed
+  std::string archive;
+  std::string screenshot;  ///< PNG to write; with kWindow: of the window, after `frames` frames
+  int frames = 0;          ///< 0: until the window is closed
   bool overwrite = false;
   bool overlay = true;           ///< figures on the screen
   bool legend = false;           ///< on pictures

@@ -56,7 +56,7 @@ class Renderer {
   /// Where ColourMode::kTexture finds its textures.
   void set_textures(TileTexture textures) { textures_ = std::move(textures); }
 
-  /// Colours of the ground from one value to another: elevations, in the source's units, or differences of them.
+  /// Colours of the ground from one elevation to another, in the source's units.
   void set_palette(const std::vector<ColourStop>& stops, double low, double high);
 
   /// Draws what the tiles of a range of the coarsest plane stand for, as far as resident, into the bound framebuffer.

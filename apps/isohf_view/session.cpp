@@ -33,7 +33,7 @@ TileBoxLimits limits_from(const TileSource& source, const Options& options) {
   limits.upload_bytes_per_frame = options.upload_mib << 20;
   const std::uint64_t boxes = static_cast<std::uint64_t>(planes_of(source).count()) + 1;
   const std::uint64_t least = kTilesAtLeast * boxes * TileBox::most_bytes_of_a_tile(source);
-  limits.enough_mib = options.archives.size() * (source.textures() == nullptr ? 1 : 3) * ((least >> 20U) + 1);
+  limits.enough_mib = (source.textures() == nullptr ? 1 : 3) * ((least >> 20U) + 1);
   const int cores = static_cast<int>(std::thread::hardware_concurrency());
   limits.workers = options.threads > 0 ? options.threads : std::max(1, cores - 1);
   return limits;
@@ -49,24 +49,16 @@ const std::vector<std::string> kHelpLines{"left drag    move the ground         
                                           "O            sun of a day            , .           earlier, later",
                                           "U            shadows                 Z             haze",
                                           "M            colours                 + -           exaggeration",
-                                          "Y            measure from, to        Tab           other archive",
+                                          "Y            measure from, to",
                                           "X            wireframe               B             tile borders",
                                           "G            fade or switch levels   V             beyond the source",
                                           "[ ]          far distance            F             more, no figures",
                                           "P            save a picture          H, Esc        help, quit"};
 
 const char* mode_name(ColourMode mode) {
-  constexpr const char* kNames[] = {"elevation", "plain",   "levels of detail", "strip order",
-                                    "texture",   "normals", "differences"};
+  constexpr const char* kNames[] = {"elevation", "plain", "levels of detail", "strip order", "texture", "normals"};
   return kNames[static_cast<std::size_t>(mode)];
 }
-
-/// Below, the same, above.
-constexpr struct {
-  double share;
-  std::uint8_t red, green, blue;
-} kDifferenceStops[] = {
-    {-1.0, 33, 72, 158}, {-0.5, 92, 154, 210}, {0.0, 240, 240, 236}, {0.5, 230, 138, 96}, {1.0, 164, 24, 38}};
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 /// A sun that stands higher than this shades nothing to speak of.
@@ -107,8 +99,6 @@ Session::Session(const TileSource& source, const Options& options)
                   fmt::format("--level {}: this archive has levels 0 to {}", *level, levels - 1));
     }
   }
-  const bool differs = source.difference_range().has_value();
-  if (view.mode == ColourMode::kDifference && !differs) view.mode = ColourMode::kElevation;
   view.exaggeration = options.exaggeration.value_or(default_exaggeration(source));
   if (source.textures() != nullptr) {
     // Coarse planes are drawn with one picture of all, which gets an eighth.
@@ -120,15 +110,16 @@ Session::Session(const TileSource& source, const Options& options)
     textures_.emplace(source, bytes, limits_from(source, options).workers);
     renderer_.set_textures(
         [this](PlaneTile at) { return at.plane == 0 ? textures_->texture(at.tile) : texture_overview_->texture(); });
-    if (!options.mode_given && !differs) view.mode = ColourMode::kTexture;
+    if (!options.mode_given) view.mode = ColourMode::kTexture;
   } else if (view.mode == ColourMode::kTexture) {
     throw Error(ErrorCode::kInvalidArgument, "--mode texture: this archive has no textures; convert with --texture");
   }
+  legend_ = {{}, whole_.low / source.world_per_elevation(), whole_.high / source.world_per_elevation()};
   if (const Metadata* metadata = source.metadata()) {
-    colours_ = options.palette_file.empty() ? shade_colours(*metadata, options.palette)
-                                            : read_colour_relief(options.palette_file, *metadata);
+    legend_.stops = options.palette_file.empty() ? shade_colours(*metadata, options.palette)
+                                                 : read_colour_relief(options.palette_file, *metadata);
   }
-  choose_colours();
+  renderer_.set_palette(legend_.stops, legend_.low, legend_.high);
   driver_ = driver_name();
   if (options.date) begin_day(*options.date);
   Vec3 target;
@@ -141,53 +132,11 @@ Session::Session(const TileSource& source, const Options& options)
   }
 }
 
-void Session::choose_colours() {
-  const double unit = source_.world_per_elevation();
-  legend_ = {colours_, whole_.low / unit, whole_.high / unit};
-  if (view.mode == ColourMode::kDifference) {
-    const double range = *source_.difference_range();
-    legend_ = {{}, -range, range};
-    for (const auto& [share, red, green, blue] : kDifferenceStops) {
-      legend_.stops.push_back({share * range, red, green, blue});
-    }
-  }
-  renderer_.set_palette(legend_.stops, legend_.low, legend_.high);
-}
-
-void Session::set_mode(ColourMode mode) {
-  view.mode = mode;
-  choose_colours();
-}
-
 std::vector<ColourMode> Session::modes() const {
   std::vector<ColourMode> modes{ColourMode::kElevation, ColourMode::kPlain, ColourMode::kLevels, ColourMode::kStrips,
                                 ColourMode::kNormals};
   if (textures_) modes.insert(modes.begin(), ColourMode::kTexture);
-  if (source_.difference_range()) modes.insert(modes.begin(), ColourMode::kDifference);
   return modes;
-}
-
-void Session::look_as(const Session& other) {
-  const std::vector<ColourMode> known = modes();
-  const ColourMode own = view.mode;
-  view = other.view;
-  view.mode = own;
-  if (std::find(known.begin(), known.end(), other.view.mode) != known.end() && own != ColourMode::kDifference) {
-    set_mode(other.view.mode);
-  }
-  sun_azimuth_deg = other.sun_azimuth_deg;
-  sun_elevation_deg = other.sun_elevation_deg;
-  shadows = other.shadows;
-  far_distance_ = other.far_distance_;
-  camera = other.camera;
-  time_.reset();
-  if (!other.time_) return;
-  try {
-    begin_day(*other.time_);
-  } catch (const Error&) {
-    // Where the sun's way is not known it stays where it stood.
-  }
-  sun_before_ = other.sun_before_;
 }
 
 Vec3 Session::from_archive(Vec3 at) const {
@@ -245,10 +194,6 @@ void Session::prepare() {
   reach_wanted_ = std::min(view.far_distance, farthest);
   const auto sun = casting_sun(sun_azimuth_deg, sun_elevation_deg, view.exaggeration, shadow_softness_);
   view.shadows = shadows && sun;
-  if (view.mode == ColourMode::kDifference) {
-    view.shadows = false;
-    return boxes_.set_sun(CastingSun{.difference = true});
-  }
   boxes_.set_sun(view.shadows ? sun : std::nullopt);
 }
 
@@ -288,7 +233,6 @@ void Session::complete_frame() {
 }
 
 std::string Session::shadow_line() const {
-  if (view.mode == ColourMode::kDifference) return "colours: how far the second archive lies above the first";
   if (!shadows) return "shadows off";
   if (!view.shadows) return sun_elevation_deg > 0.0 ? "no shadows: the sun is overhead" : "no shadows: it is night";
   const std::int64_t to_come = boxes_.figures().shadows_to_come;
@@ -337,7 +281,7 @@ void Session::draw_overlay(const Shown& shown) {
       lines.push_back(fmt::format("heights x {:.3g}", view.exaggeration));
     }
     lines.insert(lines.end(), shown.place.begin(), shown.place.end());
-    if (view.mode == ColourMode::kElevation || view.mode == ColourMode::kDifference) reading.colours = legend_.stops;
+    if (view.mode == ColourMode::kElevation) reading.colours = legend_.stops;
     reading.low = legend_.low;
     reading.high = legend_.high;
     reading.height_unit = source_.height_unit();

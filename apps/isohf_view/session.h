@@ -65,15 +65,12 @@ class Session {
   void leave_day();
   [[nodiscard]] std::optional<double> hours() const { return time_ ? std::optional(time_->hours) : std::nullopt; }
 
-  /// Other colours of the ground; those that the source has.
-  void set_mode(ColourMode mode);
+  /// The colours of the ground that the source has.
   [[nodiscard]] std::vector<ColourMode> modes() const;
-  /// Takes camera, light, its day and all switches from another session; its own colours where they are those of a difference.
-  void look_as(const Session& other);
 
   std::function<void()> poll = [] {};  ///< may throw, as where the program was interrupted
   Camera camera;
-  ViewState view;  ///< the mode by set_mode()
+  ViewState view;
   double sun_azimuth_deg;
   double sun_elevation_deg;
   bool shadows;  ///< wanted
@@ -93,7 +90,6 @@ class Session {
   void prepare();
   void draw_legend();
   void draw();
-  void choose_colours();
   [[nodiscard]] Camera first_camera(Vec3& target) const;
   [[nodiscard]] bool shows_textures() const { return textures_ && view.mode == ColourMode::kTexture; }
   [[nodiscard]] std::string shadow_line() const;
@@ -108,7 +104,6 @@ class Session {
   std::optional<TextureOverview> texture_overview_;  ///< where there are planes
   std::uint64_t upload_bytes_;                       ///< a frame, tiles and textures together
   Hud hud_;
-  std::vector<ColourStop> colours_;  ///< of elevations
   struct {
     std::vector<ColourStop> stops;
     double low, high;

@@ -8,15 +8,7 @@
 namespace isohf::view {
 
 /// How the ground is coloured; the numbers are the terrain fragment shader's.
-enum class ColourMode {
-  kElevation = 0,
-  kPlain = 1,
-  kLevels = 2,
-  kStrips = 3,
-  kTexture = 4,
-  kNormals = 5,
-  kDifference = 6
-};
+enum class ColourMode { kElevation = 0, kPlain = 1, kLevels = 2, kStrips = 3, kTexture = 4, kNormals = 5 };
 
 /// All that a picture depends on besides the tiles.
 struct ViewState {

@@ -18,13 +18,11 @@
 #include <vector>
 
 #include "actions.h"
-#include "formats/registry.h"
 #include "gl/offscreen.h"
 #include "interrupt.h"
 #include "isohf/error.h"
 #include "opening.h"
 #include "output/standard_output.h"
-#include "paging/difference.h"
 #include "reading/place.h"
 #include "session.h"
 #include "steering.h"
@@ -84,7 +82,7 @@ class Controls {
         steering_(session.source(), ground_, session.camera, session.view),
         start_(session.camera),
         looks_(look) {
-    take_over();
+    glfwSetWindowUserPointer(window_, this);
     glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int) {
       of(w).changed_ = true;
       if (action == GLFW_PRESS) of(w).tapped_.insert(key);
@@ -98,29 +96,10 @@ class Controls {
       of(w).steering_.wheel(steps, of(w).cursor_);
     });
     glfwSetWindowRefreshCallback(window, [](GLFWwindow* w) { of(w).touched_ = true; });
-    glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** paths) {
-      of(w).changed_ = true;
-      if (count > 0) of(w).dropped = paths[count - 1];
-    });
     glfwSetCursorEnterCallback(window, [](GLFWwindow* w, int inside) {
       of(w).touched_ = true;
       of(w).inside_ = inside == GLFW_TRUE;
     });
-  }
-
-  /// The window's events come here from now on.
-  void take_over() {
-    glfwSetWindowUserPointer(window_, this);
-    changed_ = true;
-  }
-  /// What a person has set is as in `other`, whose window it was.
-  void go_on_from(const Controls& other) {
-    show_figures = other.show_figures;
-    show_help = other.show_help;
-    looks_ = other.looks_;
-    cursor_ = other.cursor_;
-    inside_ = other.inside_;
-    take_over();
   }
 
   enum class Change { kNone, kReading, kPicture };  ///< kReading: of what is read over the picture alone
@@ -167,7 +146,7 @@ class Controls {
       const TileSource& source = session_.source();
       const Vec3 way = *end - *measured_from_;
       const double rise = way.y / source.world_per_elevation();
-      const std::string unit = source.height_unit().empty() ? "" : " " + short_unit(source.height_unit());
+      const std::string unit = source.height_unit().empty() ? "" : fmt::format(" {}", short_unit(source.height_unit()));
       shown.place.push_back(fmt::format(
           "{} away, {:.{}f}{} {}",
           describe_length(distance_between(source, {measured_from_->x, measured_from_->z}, {end->x, end->z}),
@@ -209,9 +188,7 @@ class Controls {
   Session::Figures show_figures = Session::Figures::kPlace;
   bool show_help = false;
   bool wants_picture = false;
-  bool wants_other = false;  ///< the other archive
-  std::string dropped;       ///< a file's name; none where empty
-  std::string message;       ///< stands among the figures
+  std::string message;  ///< stands among the figures
 
  private:
   static Controls& of(GLFWwindow* window) { return *static_cast<Controls*>(glfwGetWindowUserPointer(window)); }
@@ -322,9 +299,6 @@ class Controls {
                        : show_figures == Session::Figures::kAll ? Session::Figures::kNone
                                                                 : Session::Figures::kPlace;
         return;
-      case GLFW_KEY_TAB:
-        wants_other = true;
-        return;
       case GLFW_KEY_P:
         wants_picture = true;
         return;
@@ -373,7 +347,7 @@ class Controls {
   void next_mode() {
     const std::vector<ColourMode> order = session_.modes();
     const auto at = std::find(order.begin(), order.end(), session_.view.mode);
-    session_.set_mode(at == order.end() || at + 1 == order.end() ? order.front() : *(at + 1));
+    session_.view.mode = at == order.end() || at + 1 == order.end() ? order.front() : *(at + 1);
   }
 
   /// The eye stays at the same height above the ground under the middle of the picture.
@@ -413,143 +387,18 @@ std::string next_picture_name() {
   }
 }
 
-/// An archive in the window.
-struct Scene {
-  Scene(Opened&& opened_archive, GLFWwindow* window, const Options& options)
-      : opened(std::move(opened_archive)), session(*opened.source, options), controls(window, session, options.fly) {}
-  Opened opened;
-  Session session;
-  Controls controls;
-};
-
-/// The archives that a window was opened with, one of them in sight; each is made when it is first looked at. One whose
-/// file is replaced is opened again, once it stands still and can be read.
-class Scenes {
- public:
-  Scenes(GLFWwindow* window, const Options& options, Opened&& first) : window_(window), options_(options) {
-    options_.memory_mib /= options.archives.size();
-    names_ = options.archives;
-    if (options.difference) names_.insert(names_.begin(), names_.front());
-    scenes_.resize(names_.size());
-    show(0, std::make_unique<Scene>(std::move(first), window_, options_));
-    if (!options.overlay) now().controls.show_figures = Session::Figures::kNone;
-    require_common_map();
-  }
-
-  [[nodiscard]] Scene& now() { return *scenes_[at_]; }
-
-  /// What keys, drops and other programs have asked for since the last frame.
-  void follow() {
-    if (!now().controls.dropped.empty()) {
-      const std::string name = std::exchange(now().controls.dropped, "");
-      attempt(name, [&] { drop(name); });
-    }
-    if (std::exchange(now().controls.wants_other, false)) {
-      if (names_.size() == 1) {
-        now().controls.message = "this is the only archive; isohf view A B shows two";
-        return;
-      }
-      attempt(names_[(at_ + 1) % names_.size()], [&] { go_to((at_ + 1) % names_.size()); });
-    }
-    const auto time = std::chrono::steady_clock::now();
-    if (time - last_look_ < kLookAgain) return;
-    last_look_ = time;
-    const FileStamp stamp = stamp_of(now().opened.name);
-    const bool stands_still = stamp == seen_;
-    seen_ = stamp;
-    if (stamp == now().opened.stamp || stamp == refused_ || !stands_still || stamp == FileStamp{}) return;
-    refused_ = stamp;
-    attempt(now().opened.name, [&] {
-      auto fresh = std::make_unique<Scene>(open(at_), window_, options_);
-      fresh->session.look_as(now().session);
-      show(at_, std::move(fresh));
-    });
-  }
-
- private:
-  static constexpr std::chrono::seconds kLookAgain{1};
-
-  /// Throws Error where another archive lies on no map of the first's: now, not when it is asked for. Rasters are
-  /// converted when they are looked at, and are held against it then.
-  void require_common_map() {
-    for (std::size_t i = 1; i < names_.size() && !options_.difference; ++i) {
-      if (native_format_of(names_[i], {}) != nullptr) continue;
-      const std::unique_ptr<TileSource> other = open_archive(names_[i]);
-      static_cast<void>(WorldJoin(*now().opened.source->archive(), *other->archive()));
-    }
-  }
-
-  [[nodiscard]] Opened open(std::size_t which) const {
-    return open_shown(names_[which], options_, options_.difference && which == 0 ? options_.archives[1] : "");
-  }
-  /// A file that cannot be shown changes nothing but what the window says.
-  template <typename What>
-  void attempt(const std::string& name, const What& what) {
-    try {
-      what();
-      now().controls.message.clear();
-    } catch (const Error& error) {
-      now().controls.message = error.what();
-      now().controls.take_over();
-      if (!options_.common.quiet) cli::print_note(name + ": not shown: " + error.what());
-    }
-  }
-  void show(std::size_t which, std::unique_ptr<Scene> scene) {
-    if (scenes_[at_]) scene->controls.go_on_from(scenes_[at_]->controls);
-    scenes_[which] = std::move(scene);
-    at_ = which;
-    glfwSetWindowTitle(window_, ("isohf-view - " + names_[which]).c_str());
-  }
-  void drop(const std::string& name) {
-    auto fresh = std::make_unique<Scene>(open_shown(name, options_), window_, options_);
-    names_.assign(names_.size(), name);
-    show(at_, std::move(fresh));
-    std::swap(scenes_[0], scenes_[at_]);
-    scenes_.resize(1);
-    names_.resize(1);
-    at_ = 0;
-    options_.difference = false;
-  }
-  /// At the same place of both worlds.
-  void go_to(std::size_t which) {
-    Scene& before = now();
-    const TileSource& from = *before.opened.source;
-    auto next = std::move(scenes_[which]);
-    if (!next) next = std::make_unique<Scene>(open(which), window_, options_);
-    const TileSource& to = *next->opened.source;
-    const WorldJoin join(*from.archive(), *to.archive());
-    const Vec3 eye = before.session.camera.eye;
-    const WorldBounds ground = from.covered();
-    const WorldPoint here{std::clamp(eye.x, ground.x0, ground.x1), std::clamp(eye.z, ground.z0, ground.z1)};
-    const WorldPoint there = to.from_archive(join(from.to_archive(here)));
-    next->session.look_as(before.session);
-    if (!std::isnan(there.x) && !std::isnan(there.z)) {
-      next->session.camera.eye = {eye.x - here.x + there.x, eye.y, eye.z - here.z + there.z};
-    }
-    show(which, std::move(next));
-  }
-
-  GLFWwindow* window_;
-  Options options_;
-  std::vector<std::string> names_;
-  std::vector<std::unique_ptr<Scene>> scenes_;
-  std::size_t at_ = 0;
-  std::chrono::steady_clock::time_point last_look_ = std::chrono::steady_clock::now();
-  FileStamp seen_;
-  FileStamp refused_;
-};
-
 }  // namespace
 
 /// Frames that take longer do not feel as if the ground were in the hand.
 constexpr double kSlow_s = 1.0 / 12.0;
 
 void run_window(const Options& options) {
-  const bool differs = options.difference;
-  Opened first = open_shown(options.archives[0], options, differs ? options.archives[1] : "");
-  const Window window(options.view.width, options.view.height, "isohf-view");
+  const std::unique_ptr<TileSource> source = open_shown(options);
+  const Window window(options.view.width, options.view.height, fmt::format("isohf-view - {}", options.archive));
   require_gl();
-  Scenes scenes(window.get(), options, std::move(first));
+  Session session(*source, options);
+  Controls controls(window.get(), session, options.fly);
+  if (!options.overlay) controls.show_figures = Session::Figures::kNone;
   // What stands still is drawn with more samples than a moving picture where that takes its time.
   const std::array<int, 2> samples{options.samples.value_or(is_software_driver() ? 1 : kPictureSamples),
                                    options.samples.value_or(kPictureSamples)};
@@ -569,9 +418,6 @@ void run_window(const Options& options) {
     const auto now = Clock::now();
     const double seconds = std::chrono::duration<double>(now - last).count();
     last = now;
-    scenes.follow();
-    Session& session = scenes.now().session;
-    Controls& controls = scenes.now().controls;
     const Controls::Change change = controls.update(std::min(seconds, 0.1));
     const bool moves = change == Controls::Change::kPicture;
     int width = 0;
@@ -633,14 +479,12 @@ void run_window(const Options& options) {
     if (is_last) break;
   }
   if (!options.common.json) return;
-  Session& session = scenes.now().session;
-  Controls& controls = scenes.now().controls;
   print_result(options.common, "", [&] {
     const Camera& camera = session.camera;
     const Vec3 eye = session.eye_in_archive();
     const std::optional<Place> place = controls.under_cursor();
     constexpr double kDegrees = 180.0 / std::numbers::pi;
-    return nlohmann::ordered_json{{"archive", scenes.now().opened.name},
+    return nlohmann::ordered_json{{"archive", options.archive},
                                   {"eye", {eye.x, eye.y, eye.z}},
                                   {"heading_deg", camera.heading_rad * kDegrees},
                                   {"pitch_deg", camera.pitch_rad * kDegrees},

@@ -63,7 +63,7 @@ TEST(Place, HasTheHeightsOfTheTriangles) {
 }
 
 TEST(Place, IsNamedInAllItsWays) {
-  Place place{{10.0, 20.0}, 12.345, {}, "metre", 1, MapPoint{500000.0, 4000000.0}, GeoPoint{-70.5, -33.25}};
+  Place place{{10.0, 20.0}, 12.345, "metre", 1, MapPoint{500000.0, 4000000.0}, GeoPoint{-70.5, -33.25}};
   const std::vector<std::string> lines = lines_of(place);
   ASSERT_EQ(lines.size(), 3U);
   EXPECT_EQ(lines[0], "x 10  z 20  elevation 12.3 m");

@@ -191,7 +191,7 @@ TEST_F(ViewProgramTest, RefusesBadUsageInTheWordsOfIsohf) {
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   };
   const std::string good = path("good.isohf");
-  refused("", "no ARCHIVE given (usage: isohf-view ARCHIVE [SECOND] [options])");
+  refused("", "no ARCHIVE given (usage: isohf-view ARCHIVE [options])");
   refused(good + " --size 3x", "--size: found '3x', must be COLUMNSxROWS");
   refused(good + " --verify --screenshot a.png", "--screenshot excludes --verify");
   refused(good + " --mode textures", "--mode: found 'textures', must be elevation, ");
@@ -205,7 +205,7 @@ TEST_F(ViewProgramTest, RefusesBadUsageInTheWordsOfIsohf) {
 TEST_F(ViewProgramTest, HelpAndVersionAreThoseOfEveryCommand) {
   const Outcome help = run("--help");
   EXPECT_EQ(help.exit_code, 0);
-  EXPECT_NE(help.out.find("Usage: isohf-view ARCHIVE [SECOND] [options]\n"), std::string::npos);
+  EXPECT_NE(help.out.find("Usage: isohf-view ARCHIVE [options]\n"), std::string::npos);
   EXPECT_NE(help.out.find("\nCommon:\n"), std::string::npos);
   EXPECT_EQ(run("-V").out.rfind("isohf-view ", 0), 0U);
 }
@@ -504,70 +504,6 @@ TEST_F(ViewProgramTest, ADragInTheWindowTakesTheGroundAlong) {
     EXPECT_NEAR(before.at("under_cursor").at(axis).get<double>(), after.at("under_cursor").at(axis).get<double>(),
                 10.0);
   }
-}
-
-/// Tab goes to the second archive and back; one that is replaced is shown anew, half a file is not, the eye stays.
-TEST_F(ViewProgramTest, GoesToAndFroAndShowsWhatIsReplaced) {
-  if (std::system("command -v xvfb-run >/dev/null 2>&1 && command -v xdotool >/dev/null 2>&1") != 0) {
-    GTEST_SKIP() << "xvfb-run or xdotool is not installed";
-  }
-  test::write_analytic_archive(path("other.isohf"), TileGrid::make(TileShape::make(20, 27, 2), 3, 2, 320.0, 320.0));
-  std::filesystem::copy_file(path("other.isohf"), path("fresh.isohf"));
-  test::write_file(path("half.isohf"), text("other.isohf").substr(0, text("other.isohf").size() / 2));
-  test::write_file(path("two.sh"), R"sh(
-    cd "$2"
-    "$1" good.isohf other.isohf --json --window --size 320x240 --position 480,900,1500 --look-at 480,0,400 >two.json & viewer=$!
-    id=$(timeout 30 xdotool search --sync --onlyvisible --name isohf-view | head -1)
-    xdotool windowmove "$id" 0 0 windowfocus "$id" sleep 1 mousemove 150 140 sleep 0.3
-    for i in 1 2; do xdotool key Tab sleep 1 getwindowname "$id"; done >names
-    cat half.isohf >good.isohf && sleep 4 && kill -0 $viewer && mv fresh.isohf good.isohf && sleep 4
-    xdotool key Escape
-    wait $viewer
-  )sh");
-  const Outcome outcome = test::run_program({"/usr/bin/env", "xvfb-run", "-a", "-s", "-screen 0 400x300x24", "sh",
-                                             path("two.sh"), ISOHF_BIN_DIR "/isohf-view", path("")});
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_EQ(text("names"), "isohf-view - other.isohf\nisohf-view - good.isohf\n");
-  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-  EXPECT_NE(outcome.err.find("good.isohf: not shown: "), std::string::npos) << outcome.err;
-  const auto end = nlohmann::json::parse(text("two.json"));
-  EXPECT_NEAR(end.at("eye").at(1).get<double>(), 900.0, 1e-6) << "the eye stays";
-  const auto there = end.at("under_cursor");
-  const Outcome probed = run(path("other.isohf") + " --json --probe " + std::to_string(there.at("x").get<double>()) +
-                             "," + std::to_string(there.at("z").get<double>()));
-  const auto place = nlohmann::json::parse(probed.out).at("places").at(0);
-  // The place was handed over in six decimals.
-  EXPECT_NEAR(place.at("elevation").get<double>(), there.at("elevation").get<double>(), 1e-5)
-      << "what is in sight is the new surface";
-}
-
-TEST_F(ViewProgramTest, TellsTwoSurfacesApart) {
-  // Other lattice, and higher by 100 codes.
-  test::write_analytic_archive(path("up.isohf"), TileGrid::make(TileShape::make(36, 51, 3), 3, 2, 320.0, 320.0),
-                               [](TileIndex, std::vector<std::uint16_t>& codes) {
-                                 for (std::uint16_t& code : codes) code = static_cast<std::uint16_t>(code + 100);
-                               });
-  const auto place = [&](const std::string& arguments) {
-    const Outcome outcome = run(arguments + " --probe 401,303 --json");
-    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-    return nlohmann::json::parse(outcome.out).at("places").at(0);
-  };
-  const auto both = place(path("good.isohf") + " " + path("up.isohf") + " --difference");
-  const double above = place(path("up.isohf")).at("elevation").get<double>() - both.at("elevation").get<double>();
-  EXPECT_NEAR(both.at("difference").get<double>(), above, 0.02) << "elevations are rounded to a decimal of a step";
-  EXPECT_GT(above, 0.0);
-  const std::string shot = " --size 200x150 --overwrite --screenshot " + path("d.png");
-  EXPECT_EQ(run(path("good.isohf") + " " + path("up.isohf") + " --difference" + shot).exit_code, 0);
-  const std::string apart = text("d.png");
-  EXPECT_EQ(run(path("up.isohf") + " " + path("good.isohf") + " --difference" + shot).exit_code, 0);
-  EXPECT_NE(apart, text("d.png")) << "red above, blue below";
-  EXPECT_EQ(run(path("good.isohf") + " " + path("up.isohf") + shot).exit_code, 2);
-  EXPECT_EQ(run(path("good.isohf") + " --difference" + shot).exit_code, 2);
-  test::write_analytic_archive(path("far.isohf"), grid());
-  const Outcome map =
-      run(ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif " + path("far.isohf") + " --difference" + shot);
-  EXPECT_EQ(map.exit_code, 2);
-  EXPECT_NE(map.err.find("no place is known in both"), std::string::npos) << map.err;
 }
 
 /// docs/schema/view.json lists what is printed, member by member.

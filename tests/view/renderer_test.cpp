@@ -291,23 +291,6 @@ TEST_F(RendererTest, FadesBetweenLevelsWithoutJumps) {
   }
 }
 
-TEST_F(RendererTest, AnotherArchivesSessionTakesTheDayAlong) {
-  const auto source = open_archive(ISOHF_SOURCE_DIR "/testdata/archives/v1/projected.isohf");
-  Options morning;
-  morning.date = SolarTime{2026, 6, 21, 9.0};
-  Session first(*source, morning);
-  first.set_hours(18.5);
-  Session second(*source, morning);
-  second.look_as(first);
-  EXPECT_EQ(second.hours(), 18.5);
-  EXPECT_EQ(second.sun_azimuth_deg, first.sun_azimuth_deg);
-  first.leave_day();
-  second.leave_day();
-  EXPECT_EQ(second.sun_elevation_deg, first.sun_elevation_deg) << "the sun of before";
-  second.look_as(first);
-  EXPECT_FALSE(second.hours());
-}
-
 TEST(Camera, LooksStraightDownWithNorthUp) {
   Camera camera;
   camera.heading_rad = 2.0;

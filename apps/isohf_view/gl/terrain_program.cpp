@@ -134,7 +134,7 @@ uniform float shadow_gain;      // part of the sun that 1 hides; 0: no shadows
 float sun_share() { return clamp(1.0 - v_place.w * shadow_gain, 0.0, 1.0); }
 )glsl";
 
-// MODE as in view_state.h: 0 elevation colours, 1 plain, 2 levels of detail, 3 strip order, 4 texture, 5 normals, 6 differences. Each
+// MODE as in view_state.h: 0 elevation colours, 1 plain, 2 levels of detail, 3 strip order, 4 texture, 5 normals. Each
 // mode is a program of its own, and what does not change from pixel to pixel comes as a uniform: a software rasteriser
 // takes every branch and repeats every sum in every pixel.
 constexpr const char* kTerrainFragment = R"glsl(
@@ -180,8 +180,6 @@ vec3 strip_colour() {
 vec3 base_colour() {
 #if MODE == 0
   return hypsometric();
-#elif MODE == 6
-  return texture(palette, vec2(0.5 + 0.5 * v_place.w, 0.5)).rgb;
 #elif MODE == 2
   return level_colour;
 #elif MODE == 3

@@ -16,7 +16,6 @@ struct CastingSun {
   double elevation_deg = 15.0;       ///< above 0, below 90
   std::optional<double> softness{};  ///< k of Eq. 16, true world units, > 0; nullopt: the sun's disc
   double exaggeration = 1.0;         ///< of heights, > 0
-  bool difference = false;           ///< no light at all: how far another surface lies above this one, in its place
   friend bool operator==(const CastingSun&, const CastingSun&) = default;
 };
 

@@ -37,14 +37,7 @@ LoadedTile load_tile(const TileSource& source, TileIndex tile) {
 CastShadows cast(const TileSource& source, const ShadowRequest& request, const std::atomic<bool>& leaves) {
   CastShadows cast{{}, request.sun_number, {}};
   try {
-    if (!request.sun.difference) {
-      cast.shadows = cast_shadows(source, request.sun, request.tiles, request.limits, leaves, cast.error);
-      return cast;
-    }
-    for (const TileIndex tile : request.tiles) {
-      if (leaves) break;
-      cast.shadows.push_back({tile, source.differences(tile), 0.0F});
-    }
+    cast.shadows = cast_shadows(source, request.sun, request.tiles, request.limits, leaves, cast.error);
   } catch (const std::exception& error) {
     cast.error = error.what();
   }

@@ -14,15 +14,34 @@
 #include "isohf/archive/textures/texture_reader.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
-#include "isohf/surface.h"
-#include "paging/difference.h"
 
 namespace isohf::view {
 namespace {
 
+/// Another reader of the same bytes, whatever its file's name has become: one whose reference systems are understood as
+/// far as can be, which may load PROJ. `archive`, which several threads may be reading, outlives it.
+ArchiveReader understood(const ArchiveReader& archive) {
+  ArchiveReader another({std::shared_ptr<void>(), &archive.source()}, archive.path());
+  try {
+    understand_source(another);
+  } catch (const Error&) {
+    // Places have no longitude and latitude then, nor one in the sky.
+  }
+  return another;
+}
+
+/// The place of an archive's world; nullopt if that is not known.
+std::optional<WorldGeoreference> understood_places(const ArchiveReader& archive) {
+  try {
+    return WorldGeoreference(understood(archive).metadata());
+  } catch (const Error&) {
+    return std::nullopt;  // nor coordinates
+  }
+}
+
 class ArchiveSource final : public TileSource {
  public:
-  ArchiveSource(const std::string& path, const std::string& second, const std::string& name)
+  ArchiveSource(const std::string& path, const std::string& name)
       : reader_(name.empty() ? ArchiveReader(path) : ArchiveReader(open_file_source(path), name)),
         ground_scale_(isohf::ground_scale(reader_.metadata())),
         grid_(scaled(reader_.grid(), ground_scale_)),
@@ -41,7 +60,6 @@ class ArchiveSource final : public TileSource {
       scale_ = {whole.low, whole.high > whole.low ? (whole.high - whole.low) / (kVoidCode - 1) : 1.0};
     }
     if (texture_info(metadata)) textures_.emplace(reader_);
-    if (!second.empty()) difference_.emplace(reader_, second);
   }
 
   [[nodiscard]] const TileGrid& grid() const override { return grid_; }
@@ -73,9 +91,6 @@ class ArchiveSource final : public TileSource {
     [[nodiscard]] bool is_to_scale() const override { return whole_.is_to_scale(); }
     [[nodiscard]] WorldBounds covered() const override { return whole_.covered(); }
     [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return whole_.bounds(tile, plane_); }
-    [[nodiscard]] std::vector<std::int16_t> differences(TileIndex tile) const override {
-      return whole_.differences(tile, *this);
-    }
     void read(TileIndex tile, std::span<std::uint16_t> codes) const override {
       whole_.convert(whole_.reader_.read_tile(tile, plane_), codes);
     }
@@ -92,11 +107,6 @@ class ArchiveSource final : public TileSource {
   [[nodiscard]] Place describe(WorldPoint at, std::optional<double> height) const override {
     Place place = TileSource::describe(at, height);
     place.unit = height_unit();
-    if (difference_ && place.elevation) {
-      double difference = *place.elevation;
-      difference_->take_from({&place.at, 1}, {&difference, 1});
-      if (!std::isnan(difference)) place.difference = difference;
-    }
     std::call_once(georeference_once_, [this] { georeference_ = understood_places(reader_); });
     if (!georeference_) return place;
     if (georeference_->has_source() && reader_.metadata().source.crs_unit != "degree") {
@@ -110,13 +120,6 @@ class ArchiveSource final : public TileSource {
   [[nodiscard]] double world_per_elevation() const override { return world_per_elevation_; }
   [[nodiscard]] const Metadata* metadata() const override { return &reader_.metadata(); }
   [[nodiscard]] DaySky sky() const override { return DaySky(understood(reader_)); }
-  [[nodiscard]] const ArchiveReader* archive() const override { return &reader_; }
-  [[nodiscard]] std::optional<double> difference_range() const override {
-    return difference_ ? std::optional(difference_->range()) : std::nullopt;
-  }
-  [[nodiscard]] std::vector<std::int16_t> differences(TileIndex tile) const override {
-    return differences(tile, *this);
-  }
 
   [[nodiscard]] const TextureInfo* textures() const override { return textures_ ? &textures_->info() : nullptr; }
   [[nodiscard]] bool has_texture(TileIndex tile) const override { return textures_ && textures_->has(tile); }
@@ -134,34 +137,6 @@ class ArchiveSource final : public TileSource {
     }
     return {true, entry.has_voids, scale_.offset + scale_.scale * entry.code_min,
             scale_.offset + scale_.scale * entry.code_max};
-  }
-
-  /// At the vertices of a tile of this source or of a coarse plane, `at`, whose edge tiles end with the world.
-  [[nodiscard]] std::vector<std::int16_t> differences(TileIndex tile, const TileSource& at) const {
-    constexpr double kSteps = 32767.0;
-    const TileShape& shape = at.grid().shape();
-    const auto count = static_cast<std::size_t>(shape.stored_vertex_count());
-    std::vector<float> codes(count);
-    at.read_heights(tile, codes);
-    std::vector<WorldPoint> places;
-    std::vector<double> values;
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto columns = static_cast<std::size_t>(shape.columns());
-      const ObjectVertex vertex =
-          object_from_grid(shape, GridVertex{static_cast<int>(i % columns), static_cast<int>(i / columns)});
-      const WorldPoint place =
-          at.grid().world_from_object(tile, {static_cast<double>(vertex.x), static_cast<double>(vertex.z)});
-      places.push_back(
-          to_archive({std::clamp(place.x, 0.0, grid_.world_width()), std::clamp(place.z, 0.0, grid_.world_height())}));
-      values.push_back((scale_.offset + scale_.scale * static_cast<double>(codes[i])) / world_per_elevation_);
-    }
-    difference_->take_from(places, values);
-    std::vector<std::int16_t> found;
-    for (const double value : values) {
-      const double share = std::isnan(value) ? 0.0 : std::clamp(value / difference_->range(), -1.0, 1.0);
-      found.push_back(static_cast<std::int16_t>(std::lround(kSteps * share)));
-    }
-    return found;
   }
 
   [[nodiscard]] bool is_float() const { return reader_.metadata().quantisation.type == CodeType::kF32; }
@@ -206,7 +181,6 @@ class ArchiveSource final : public TileSource {
   mutable std::once_flag georeference_once_;
   mutable std::optional<WorldGeoreference> georeference_;
   std::optional<TextureReader> textures_;
-  std::optional<SurfaceDifference> difference_;
   std::optional<Planes> planes_;
   std::vector<std::unique_ptr<Coarse>> coarse_;
 };
@@ -248,10 +222,6 @@ std::string TileSource::height_unit() const {
 
 DaySky TileSource::sky() const {
   throw Error(ErrorCode::kInvalidArgument, "the sun's way over this ground is not known");
-}
-
-std::vector<std::int16_t> TileSource::differences(TileIndex) const {
-  return std::vector<std::int16_t>(static_cast<std::size_t>(grid().shape().stored_vertex_count()));
 }
 
 Picture TileSource::read_texture(TileIndex, int) const {
@@ -296,8 +266,8 @@ TileBounds whole_bounds(const TileSource& source) {
   return source.whole_;
 }
 
-std::unique_ptr<TileSource> open_archive(const std::string& path, const std::string& second, const std::string& name) {
-  return std::make_unique<ArchiveSource>(path, second, name);
+std::unique_ptr<TileSource> open_archive(const std::string& path, const std::string& name) {
+  return std::make_unique<ArchiveSource>(path, name);
 }
 
 }  // namespace isohf::view

@@ -41,12 +41,11 @@ struct TileBounds {
 
 /// The names of a place.
 struct Place {
-  WorldPoint at{};                   ///< in the archive's world
-  std::optional<double> elevation;   ///< in `unit`
-  std::optional<double> difference;  ///< how far the second surface lies above it
-  std::string unit;                  ///< empty where it is not known
-  int decimals = 0;                  ///< of the elevation: as many as codes have steps
-  std::optional<MapPoint> map;       ///< in the source's system, where that is a map
+  WorldPoint at{};                  ///< in the archive's world
+  std::optional<double> elevation;  ///< in `unit`
+  std::string unit;                 ///< empty where it is not known
+  int decimals = 0;                 ///< of the elevation: as many as codes have steps
+  std::optional<MapPoint> map;      ///< in the source's system, where that is a map
   std::optional<GeoPoint> geo;
   bool is_outside = false;  ///< of what the source covers; without an elevation inside it is void
 };
@@ -81,12 +80,6 @@ class TileSource {
   [[nodiscard]] WorldPoint to_archive(WorldPoint at) const;
   /// All names of a place whose height is known, world units.
   [[nodiscard]] virtual Place describe(WorldPoint at, std::optional<double> height) const;
-  /// How far most of a second surface lies from this one; nullopt: there is none.
-  [[nodiscard]] virtual std::optional<double> difference_range() const { return std::nullopt; }
-  /// How far it lies above each vertex of a tile, 32767 for the range and beyond; 0 where there is none. [C x R]
-  [[nodiscard]] virtual std::vector<std::int16_t> differences(TileIndex tile) const;
-  /// nullptr where there is none.
-  [[nodiscard]] virtual const ArchiveReader* archive() const { return nullptr; }
   /// World units of one elevation unit; 1 where either is not known.
   [[nodiscard]] virtual double world_per_elevation() const { return 1.0; }
   /// nullptr where there is no archive.
@@ -110,10 +103,8 @@ class TileSource {
 
 /// Opens an archive for viewing. 16- and 8-bit codes are taken as they are; float elevations are rounded to 65535
 /// steps between the dataset's smallest and largest elevation. Throws what ArchiveReader throws.
-/// second  an archive whose surface this one is compared with; or none
-/// name    what messages call it; empty: its path
-[[nodiscard]] std::unique_ptr<TileSource> open_archive(const std::string& path, const std::string& second = "",
-                                                       const std::string& name = "");
+/// name  what messages call it; empty: its path
+[[nodiscard]] std::unique_ptr<TileSource> open_archive(const std::string& path, const std::string& name = "");
 
 /// Tile columns and rows first..last, inclusive; empty where last < first.
 struct TileRange {

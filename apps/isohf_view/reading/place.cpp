@@ -37,10 +37,6 @@ std::vector<std::string> lines_of(const Place& place) {
         fmt::format("  elevation {:.{}f}{}", rounded(*place.elevation, place.decimals), place.decimals, unit);
   }
   if (!place.elevation) lines.back() += place.is_outside ? "  outside" : "  void";
-  if (place.difference) {
-    const int decimals = place.decimals + 1;
-    lines.push_back(fmt::format("the second lies {:+.{}f}{}", rounded(*place.difference, decimals), decimals, unit));
-  }
   if (place.map) lines.push_back(fmt::format("E {:.2f}  N {:.2f}", place.map->easting, place.map->northing));
   if (place.geo) {
     const double east = place.geo->longitude;
@@ -55,7 +51,6 @@ ordered_json json_of(const Place& place) {
   ordered_json json{{"x", place.at.x}, {"z", place.at.z}, {"elevation", nullptr}};
   if (place.elevation) json["elevation"] = *place.elevation;
   json["unit"] = place.unit.empty() ? ordered_json(nullptr) : ordered_json(place.unit);
-  if (place.difference) json["difference"] = *place.difference;
   if (place.map) json["map"] = {place.map->easting, place.map->northing};
   if (place.geo) json["longitude"] = place.geo->longitude;
   if (place.geo) json["latitude"] = place.geo->latitude;
