@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "gl/block.h"
 #include "reading/hud.h"
 
 namespace isohf::view {
@@ -84,7 +83,7 @@ Camera between(const Camera& from, const Camera& to, double share) {
 Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* target, Vec3 towards_eye) {
   const TileBounds whole = whole_bounds(source);
   const WorldBounds covered = source.covered();
-  const double low = view.base ? Block::floor(source, view) : whole.low * view.exaggeration;
+  const double low = whole.low * view.exaggeration;
   const double high = whole.high * view.exaggeration;
   const Vec3 middle{0.5 * (covered.x0 + covered.x1), 0.5 * (low + high), 0.5 * (covered.z0 + covered.z1)};
   const Vec3 way = normalised(towards_eye);

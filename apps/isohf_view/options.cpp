@@ -202,7 +202,6 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   bool verify = false;
   bool no_haze = false;
   bool no_overlay = false;
-  bool no_base = false;
   std::optional<double> time;
   CommandLine line("view", "Views an archive of an isometric heightfield, or draws and checks it without a screen.");
   line.group("Arguments");
@@ -211,7 +210,6 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   add_actions(line, options, window, verify);
   add_picture(line, options);
   line.flag("--no-haze", "Leave out the haze towards the far distance", no_haze);
-  line.flag("--no-base", "Leave out the block that the ground stands on, and the hatching below voids", no_base);
   line.flag("--no-overlay", "Leave out what a window writes over the picture", no_overlay);
   line.flag("--legend", "Write scale bar, North arrow and the colours' legend on pictures", options.legend);
   add_light(line, options, time);
@@ -244,7 +242,6 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   if (!options.probe.empty()) options.action = Options::Action::kProbe;
   options.view.haze = !no_haze;
   options.overlay = !no_overlay;
-  options.view.base = !no_base;
   if (!options.screenshot.empty() && !window) options.action = Options::Action::kScreenshot;
   if (verify) options.action = Options::Action::kVerify;
   needs("--frames", options.action == Options::Action::kWindow, "a window");

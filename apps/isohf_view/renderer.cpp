@@ -67,8 +67,7 @@ Vec3 by_day(Vec3 colour, Vec3 sun) {
 }
 
 /// The uniforms of light and haze.
-template <typename AnyProgram>
-void set_light(const AnyProgram& program, const ViewState& view, const Air& air) {
+void set_light(const TerrainProgram& program, const ViewState& view, const Air& air) {
   const Vec3 sun = normalised(view.sun);
   set_vec3(program.uniform("sun"), sun);
   const double height = std::clamp(sun.y * 2.5, 0.0, 1.0);
@@ -396,12 +395,6 @@ void Renderer::draw_wires(Frame& frame) const {
   glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
 }
 
-void Renderer::draw_base(const Frame& frame) {
-  if (!block_) block_.emplace(source_);
-  set_light(block_->begin(frame.view, frame.terrain), frame.view, air_);
-  block_->draw();
-}
-
 void Renderer::draw_sky(const ViewState& view) const {
   sky_.use();
   const Mat4 camera = look_along(view.forward);
@@ -436,12 +429,6 @@ FrameFigures Renderer::draw(const ViewState& view, const TileRange& top, const R
   // Depth is fine only near the eye: begin it where the ground begins, or two meshes of one hill cannot be told apart.
   double nearest = view.far_distance;
   for (const Item& item : frame.items) nearest = std::min(nearest, item.nearest);
-  if (view.base) {
-    const WorldBounds covered = source_.covered();
-    const TileVolume box{Vec3{covered.x0, Block::floor(source_, view), covered.z0} - view.eye,
-                         Vec3{covered.x1, whole_.low * view.exaggeration, covered.z1} - view.eye};
-    nearest = std::min(nearest, box.distance());
-  }
   // In the corners of the view depth is the least part of distance.
   const double half_y = std::tan(view.fov_y_rad / 2.0);
   const double half_x = half_y * view.width / view.height;
@@ -457,7 +444,6 @@ FrameFigures Renderer::draw(const ViewState& view, const TileRange& top, const R
   glClear(GL_DEPTH_BUFFER_BIT);
   glActiveTexture(GL_TEXTURE0);
   draw_opaque(frame);
-  if (view.base && !view.beyond && whole_.stored) draw_base(frame);
   draw_sky(view);
   frame.figures.passes = 1;
   if (std::any_of(frame.items.begin(), frame.items.end(), fades)) {

@@ -3,11 +3,9 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <optional>
 #include <tuple>
 #include <vector>
 
-#include "gl/block.h"
 #include "gl/terrain_program.h"
 #include "gl/tile_buffers.h"
 #include "isohf/lattice/lod.h"
@@ -100,7 +98,6 @@ class Renderer {
   void draw_opaque(Frame& frame);
   void draw_fading(Frame& frame);
   void draw_wires(Frame& frame) const;
-  void draw_base(const Frame& frame);
   void place_texture(const TerrainProgram& program, PlaneTile at) const;
   void draw_mesh(Frame& frame, const TerrainProgram& program, const Item& item, int level) const;
   void begin_shading(const Frame& frame, const TerrainProgram& program) const;
@@ -115,7 +112,6 @@ class Renderer {
   std::vector<PlaneTile> drawn_;
   TerrainPrograms flat_;
   Program sky_;
-  std::optional<Block> block_;  ///< made when first wanted
   TileTexture textures_;
   Texture no_texture_;  ///< one texel without alpha
   Texture palette_;

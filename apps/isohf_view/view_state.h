@@ -23,7 +23,6 @@ struct ViewState {
   bool wireframe = false;
   bool borders = false;
   bool haze = true;
-  bool base = false;                  ///< the ground stands on a block
   bool beyond = false;                ///< shows tiles beyond the source's edge as well
   std::optional<double> fixed_level;  ///< draws every tile at this fractional level
   std::optional<double> other_level;  ///< of every second tile, like a chessboard; with fixed_level

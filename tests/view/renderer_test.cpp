@@ -138,65 +138,6 @@ TEST_F(RendererTest, OverviewsFromAnywhereHaveAllCornersInView) {
   }
 }
 
-TEST_F(RendererTest, StandsOnABlockWhoseHatchedFloorShowsThroughVoids) {
-  const test::MemoryTiles source(small_grid(), [](TileIndex tile, std::vector<std::uint16_t>& codes) {
-    if (tile == TileIndex{1, 1}) std::fill(codes.begin(), codes.end(), kVoidCode);
-  });
-  Options options;
-  options.view.width = 320;
-  options.view.height = 240;
-  const auto sky = [&](Vec3 from, Vec3 to, bool base) {
-    options.view.base = base;
-    options.position = from;
-    options.look_at = to;
-    Session session(source, options);
-    const Offscreen target(320, 240, GL_RGBA8);
-    session.complete_frame();
-    check_gl("drawing");
-    const auto pixels = target.read_rgba8();
-    double share = 0.0;
-    for (std::size_t i = 0; i < pixels.size(); i += 4) share += pixels[i + 2] > pixels[i] + 15 ? 4.0 : 0.0;
-    return share / static_cast<double>(pixels.size());
-  };
-  const Vec3 above{960.0, 900.0, 961.0};
-  const Vec3 void_tile{960.0, 0.0, 960.0};
-  EXPECT_GT(sky(above, void_tile, false), 0.3) << "a hole";
-  EXPECT_LT(sky(above, void_tile, true), 0.01);
-  const Vec3 beside{1280.0, 100.0, 2600.0};
-  const Vec3 wall{1280.0, 0.0, 1920.0};
-  EXPECT_LT(sky(beside, wall, true), sky(beside, wall, false) - 0.03);
-  EXPECT_LT(Block::floor(source, options.view), whole_bounds(source).low * options.exaggeration.value_or(1.0));
-}
-
-/// Hatches are as wide in the picture from near as from afar, so that small voids have them as well.
-TEST_F(RendererTest, HatchesVoidsAsFinelyFromAnyDistance) {
-  const test::MemoryTiles source(small_grid(), [](TileIndex tile, std::vector<std::uint16_t>& codes) {
-    if (tile.column > 0) std::fill(codes.begin(), codes.end(), kVoidCode);
-  });
-  Options options;
-  options.view.width = 320;
-  options.view.height = 240;
-  options.view.base = true;
-  options.view.haze = false;
-  for (const double above : {1000.0, 300.0, 30.0}) {
-    const double floor = Block::floor(source, options.view);
-    options.position = Vec3{1600.0, floor + above, 960.0};
-    options.look_at = Vec3{1600.0, floor, 959.0};
-    options.exaggeration = 1.0;
-    Session session(source, options);
-    const Offscreen target(320, 240, GL_RGBA8);
-    session.complete_frame();
-    const auto pixels = target.read_rgba8();
-    int changes = 0;
-    for (std::size_t x = 1; x < 320; ++x) {
-      const auto at = [&](std::size_t column) { return static_cast<int>(pixels[(120 * 320 + column) * 4]); };
-      changes += (at(x) > 105) != (at(x - 1) > 105) ? 1 : 0;
-    }
-    EXPECT_GT(changes, 30) << above;
-    EXPECT_LT(changes, 160) << above;
-  }
-}
-
 TEST_F(RendererTest, HasTheSkyOfTheBody) {
   const auto zenith = [](const std::string& body) {
     test::MemoryTiles source(small_grid());
