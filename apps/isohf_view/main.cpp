@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -61,11 +60,11 @@ int take_screenshot(const TileSource& source, const Options& options) {
 
 std::string text_from(const ViewReport& report, const std::string& archive) {
   std::string text = fmt::format(
-      "{} tiles, {} pictures, {} pixels, {} vertices, {} shared vertices, {} pixels across seams\n"
+      "{} tiles, {} pictures, {} pixels, {} vertices, {} shared vertices\n"
       "worst height {:.4f} codes, worst normal {:.2e}\n",
       report.tiles, cli::describe_count(report.pictures), cli::describe_count(report.pixels),
-      cli::describe_count(report.vertices), cli::describe_count(report.shared_vertices),
-      cli::describe_count(report.seam_pixels), report.worst_height, report.worst_normal);
+      cli::describe_count(report.vertices), cli::describe_count(report.shared_vertices), report.worst_height,
+      report.worst_normal);
   if (report.suns_deg.empty()) {
     text += fmt::format("shadows: not looked at, as {}\n",
                         report.is_part ? "tiles that may cast them are elsewhere" : "tiles are at fault");
@@ -105,7 +104,6 @@ ordered_json json_from(const ViewReport& report, const std::string& archive) {
           {"pixels", report.pixels},
           {"vertices", report.vertices},
           {"shared_vertices", report.shared_vertices},
-          {"seam_pixels", report.seam_pixels},
           {"worst_height_codes", report.worst_height},
           {"worst_normal", report.worst_normal},
           {"suns_deg", report.suns_deg},
@@ -118,7 +116,6 @@ ordered_json json_from(const ViewReport& report, const std::string& archive) {
 
 int verify(const TileSource& source, const Options& options) {
   ViewChecks wanted;
-  wanted.every = options.every;
   const TileGrid& grid = source.grid();
   if (const std::optional<isohf::TileRange>& tiles = options.tiles) {
     if (tiles->end.column > grid.tile_columns() || tiles->end.row > grid.tile_rows()) {
@@ -128,17 +125,9 @@ int verify(const TileSource& source, const Options& options) {
     wanted.tiles = tiles;
   }
   cli::ProgressDisplay display(cli::ProgressMode::kAuto, options.common.quiet, options.common.verbose);
-  // Of several checks at a time the one that is farthest behind.
-  std::map<std::string, std::pair<std::int64_t, std::int64_t>> state;
   wanted.progress = [&, check = interrupt_check()](const char* what, std::int64_t done, std::int64_t all) {
     check();
-    state[what] = {done, all};
-    const auto share = [](const auto& entry) {
-      return static_cast<double>(entry.second.first) / static_cast<double>(entry.second.second);
-    };
-    const auto last =
-        std::min_element(state.begin(), state.end(), [&](const auto& a, const auto& b) { return share(a) < share(b); });
-    display.update(last->first, last->first == "tiles" ? "tiles" : "rows", last->second.first, last->second.second);
+    display.update(what, std::string_view(what) == "tiles" ? "tiles" : "rows", done, all);
   };
   const ViewReport report = verify_view(source, make_index_arrays(grid.shape()), wanted);
   display.clear();

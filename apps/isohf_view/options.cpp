@@ -83,8 +83,6 @@ void add_actions(CommandLine& line, Options& options, bool& window, bool& verify
   line.option("--tiles", "A:B,C:D",
               "Verify columns A to B-1 and rows C to D-1 of tiles alone, from 0 in the North-West",
               [&](const std::string& text) { options.tiles = cli::parse_tile_range(text); });
-  line.option("--every", "N", "Verify one tile in N along each row and column, one row of shadows, one block of seams",
-              [&](const std::string& text) { options.every = cli::parse_whole_number(text, 1, 1000000); });
   line.option("--probe", "X,Z[,X,Z]",
               "Say what is known of a place, in world units; of two also the heights between them",
               [&](const std::string& text) {
@@ -233,7 +231,6 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
     line.fail(fmt::format("--legend needs pictures of at least {}x{} (--size)", kLegend_px.width, kLegend_px.height));
   }
   needs("--tiles", verify, "--verify");
-  needs("--every", verify, "--verify");
   needs("--time", options.date.has_value(), "--date");
   if (time) options.date->hours = *time;
   if (options.position && options.look_at && *options.position == *options.look_at) {

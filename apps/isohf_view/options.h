@@ -31,7 +31,6 @@ struct Options {
   std::optional<ShadePalette> palette;
   std::string palette_file;
   std::optional<isohf::TileRange> tiles;  ///< that --verify looks at
-  std::int64_t every = 1;                 ///< one in so many of them
   std::vector<double> probe;              ///< x, z of a place, or of two
   double sun_azimuth_deg = 300.0;
   double sun_elevation_deg = 35.0;

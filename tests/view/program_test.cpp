@@ -258,22 +258,6 @@ TEST_F(ViewProgramTest, SaysThatOptionsForARasterAreThoseOfConvert) {
   EXPECT_NE(notes.err.find("nor is it a raster of a kind that is viewed"), std::string::npos) << notes.err;
 }
 
-TEST_F(ViewProgramTest, VerifiesOneTileInSoMany) {
-  const auto tiles = [&](const std::string& options) {
-    const Outcome outcome = run(path("good.isohf") + " --verify --json" + options);
-    EXPECT_EQ(outcome.exit_code, 0) << outcome.out << outcome.err;
-    return nlohmann::json::parse(outcome.out);
-  };
-  const auto all = tiles("");
-  const auto some = tiles(" --every 2");
-  EXPECT_EQ(some.at("tiles").get<int>(), all.at("tiles").get<int>() / 2);
-  for (const char* what : {"shadow_vertices", "pixels"}) {
-    EXPECT_LT(some.at(what).get<double>(), 0.8 * all.at(what).get<double>()) << what;
-    EXPECT_GT(some.at(what).get<double>(), 0.0) << what;
-  }
-  EXPECT_EQ(run(path("good.isohf") + " --every 2").exit_code, 2);
-}
-
 TEST_F(ViewProgramTest, VerifyOfAPartSaysWhyItLooksAtNoShadows) {
   ASSERT_EQ(test::run_isohf({"extract", path("good.isohf"), "-o", path("part.isohf"), "--tiles", "0:2,0:1"}).exit_code,
             0);

@@ -30,10 +30,9 @@ std::string text_of(const ViewReport& report) {
   return text;
 }
 
-ViewChecks quick(bool seams) {
+ViewChecks quick() {
   ViewChecks options;
   options.fractions.clear();
-  options.seams = seams;
   return options;
 }
 
@@ -44,36 +43,7 @@ TEST_F(VerifyViewTest, PassesOnSoundTiles) {
   const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()));
   EXPECT_TRUE(report.passed()) << text_of(report);
   EXPECT_EQ(report.tiles, 6);
-  EXPECT_GT(report.seam_pixels, 100000);
   EXPECT_GT(report.shared_vertices, 450);
-}
-
-TEST_F(VerifyViewTest, ManyTilesTakeTurns) {
-  const MemoryTiles source(TileGrid::make(TileShape::make(20, 27, 3), 13, 5, 480.0, 496.0));
-  const IndexArrays sound = make_index_arrays(source.grid().shape());
-  ViewChecks some;
-  some.tiles = isohf::TileRange{{0, 0}, {8, 5}};
-  const ViewReport all_pictures = verify_view(source, sound, some);
-  const ViewReport in_turn = verify_view(source, sound);
-  EXPECT_TRUE(all_pictures.passed()) << text_of(all_pictures);
-  EXPECT_TRUE(in_turn.passed()) << text_of(in_turn);
-  EXPECT_EQ(all_pictures.tiles, 40);
-  EXPECT_EQ(in_turn.tiles, 65);
-  EXPECT_LT(in_turn.pictures, all_pictures.pictures / 2);
-  // All vertices and arrays are looked at, and each level's pictures.
-  EXPECT_EQ(in_turn.vertices * 40, all_pictures.vertices * 65);
-  for (std::size_t level = 0; level < 3; ++level) {
-    IndexArrays broken = sound;
-    broken.strips[level][broken.strips[level].size() / 2 + 5] += 1;
-    const ViewReport report = verify_view(source, broken, quick(false));
-    for (const int id : {finding::kDrawnMesh, finding::kDrawnHeight}) {
-      EXPECT_TRUE(std::any_of(
-          report.findings.begin(), report.findings.end(),
-          [&](const ViewFinding& found) { return found.id == id && found.level == static_cast<double>(level); }))
-          << level << "\n"
-          << text_of(report);
-    }
-  }
 }
 
 TEST_F(VerifyViewTest, PassesWhereTilesHaveVoids) {
@@ -107,7 +77,6 @@ TEST_F(VerifyViewTest, OfAPartNothingIsSaidOfTilesThatAreElsewhere) {
   const ViewReport report = verify_view(*part, make_index_arrays(part->grid().shape()));
   EXPECT_TRUE(report.passed()) << text_of(report);
   EXPECT_EQ(report.tiles, 4);
-  EXPECT_GT(report.seam_pixels, 10000);
 }
 
 TEST_F(VerifyViewTest, PassesOnOddShapes) {
@@ -119,9 +88,9 @@ TEST_F(VerifyViewTest, PassesOnOddShapes) {
 }
 
 /// Every finding names the level at fault, and one of them is of the check that a person would look for.
-void expect_found(const IndexArrays& arrays, int id, int level, const std::string& what, bool seams = false) {
+void expect_found(const IndexArrays& arrays, int id, int level, const std::string& what) {
   const MemoryTiles source(tiny_grid());
-  const ViewReport report = verify_view(source, arrays, quick(seams));
+  const ViewReport report = verify_view(source, arrays, quick());
   EXPECT_FALSE(report.passed()) << what;
   const bool named = std::any_of(report.findings.begin(), report.findings.end(), [&](const ViewFinding& finding) {
     return finding.id == id && finding.level == level;
@@ -182,16 +151,16 @@ TEST_F(VerifyViewTest, FindsBrokenStitches) {
   expect_found(broken, finding::kDrawnMesh, 1, "a stitch triangle leaves the edge");
 }
 
-TEST_F(VerifyViewTest, SeesCracksInPictures) {
+TEST_F(VerifyViewTest, FindsWhatWouldOpenCracks) {
   const IndexArrays sound = make_index_arrays(tiny_grid().shape());
   for (std::size_t level = 1; level < 3; ++level) {
     IndexArrays broken = sound;
     broken.stitch_counts[level] = 0;
-    expect_found(broken, finding::kDrawnCrack, static_cast<int>(level), "a level has no stitch", true);
+    expect_found(broken, finding::kDrawnMesh, static_cast<int>(level), "a level has no stitch");
   }
   IndexArrays broken = sound;
   broken.strips[0].resize(broken.strips[0].size() - 3);
-  expect_found(broken, finding::kDrawnCrack, 0, "the last triangles are missing", true);
+  expect_found(broken, finding::kDrawnMesh, 0, "the last triangles are missing");
 }
 
 void expect_tile_found(const MemoryTiles::Alter& alter, int id, const std::string& what) {
@@ -199,7 +168,7 @@ void expect_tile_found(const MemoryTiles::Alter& alter, int id, const std::strin
   const MemoryTiles source(tiny_grid(), [&](TileIndex tile, std::vector<std::uint16_t>& codes) {
     if (tile == bad) alter(tile, codes);
   });
-  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
+  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick());
   EXPECT_TRUE(std::any_of(report.findings.begin(), report.findings.end(),
                           [&](const ViewFinding& finding) { return finding.id == id; }))
       << what << "\n"
@@ -250,7 +219,7 @@ TEST_F(VerifyViewTest, FindsShiftedPadding) {
 
 TEST_F(VerifyViewTest, PassesOnSoundShadows) {
   MemoryTiles source(tiny_grid());
-  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
+  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick());
   EXPECT_TRUE(report.passed()) << text_of(report);
   EXPECT_EQ(report.suns_deg.size(), 4U);
   EXPECT_EQ(report.shadow_vertices, 4 * 2 * 6 * source.grid().shape().visible_vertex_count());
@@ -271,7 +240,7 @@ TEST_F(VerifyViewTest, PassesOnShadowsAcrossVoids) {
       }
     }
   });
-  const ViewReport report = verify_view(source, make_index_arrays(grid.shape()), quick(false));
+  const ViewReport report = verify_view(source, make_index_arrays(grid.shape()), quick());
   EXPECT_TRUE(report.passed()) << text_of(report);
 }
 
@@ -281,7 +250,7 @@ void expect_shadows_found(const std::function<void(std::span<float>)>& spoil, co
   source.set_heights([&](TileIndex tile, std::span<float> heights) {
     if (tile == TileIndex{1, 1}) spoil(heights);
   });
-  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick(false));
+  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick());
   EXPECT_FALSE(report.passed()) << what;
   for (const ViewFinding& finding : report.findings) {
     EXPECT_EQ(finding.id, finding::kDrawnShadow) << what;

@@ -7,8 +7,6 @@
 #include <array>
 #include <cstdlib>
 #include <cstring>
-#include <map>
-#include <mutex>
 #include <span>
 #include <string_view>
 
@@ -18,8 +16,6 @@
 namespace isohf::view {
 
 struct HeadlessContext::State {
-  static inline std::mutex counting;
-  static inline std::map<EGLDisplay, int> users;
   EGLDisplay display = EGL_NO_DISPLAY;
   EGLContext context = EGL_NO_CONTEXT;
 
@@ -30,9 +26,7 @@ struct HeadlessContext::State {
     if (display == EGL_NO_DISPLAY) return;
     eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     if (context != EGL_NO_CONTEXT) eglDestroyContext(display, context);
-    // All contexts of a display go with it, those of other threads too.
-    const std::lock_guard lock(counting);
-    if (--users[display] == 0) eglTerminate(display);
+    eglTerminate(display);
   }
   void open(EGLDisplay where);
 };
@@ -82,12 +76,10 @@ std::vector<EGLDisplay> possible_displays() {
 
 /// Makes the context there and uses it.
 void HeadlessContext::State::open(EGLDisplay where) {
-  const std::lock_guard lock(counting);
   if (where == EGL_NO_DISPLAY || eglInitialize(where, nullptr, nullptr) != EGL_TRUE) {
     throw refusal("EGL offers no display");
   }
   display = where;
-  ++users[display];
   if (eglBindAPI(EGL_OPENGL_API) != EGL_TRUE) throw refusal("EGL does not offer desktop OpenGL");
   const std::array<EGLint, 5> wanted{EGL_SURFACE_TYPE, 0, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
   EGLConfig config = nullptr;

@@ -11,7 +11,7 @@ namespace isohf::view {
 
 /// An OpenGL 3.3 core context without a window or a display server: on a GPU where EGL lists one (not with
 /// LIBGL_ALWAYS_SOFTWARE=1), else EGL's surfaceless platform, else its default display. Current on the thread that made it
-/// until it goes.
+/// until it goes. One at a time.
 class HeadlessContext {
  public:
   /// Throws Error{kUnsupported}, one line, where no such context can be had.

@@ -100,7 +100,7 @@ void TileProbe::draw_blend(const TileSlot& slot, bool voids, const LodBlend& ble
   target_.read_rgba32f(out);
 }
 
-void TileProbe::capture(const TileSlot& slot, bool voids, std::vector<ProbedVertex>& out) {
+void TileProbe::capture(const TileSlot& slot, TileIndex tile, bool voids, std::vector<ProbedVertex>& out) {
   out.resize(static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
   const auto bytes = static_cast<GLsizeiptr>(out.size() * sizeof(ProbedVertex));
   glBindBuffer(GL_TRANSFORM_FEEDBACK_BUFFER, captured_.get());
@@ -109,7 +109,7 @@ void TileProbe::capture(const TileSlot& slot, bool voids, std::vector<ProbedVert
   const TerrainProgram& program = feedback_.of(voids);
   frame_.clip_from_eye = Mat4::identity();  // clip positions are then the vertices' places
   program.begin(grid_, frame_);
-  program.set_tile(grid_, frame_, {0, 0});
+  program.set_tile(grid_, frame_, tile);
   slot.bind();
   glEnable(GL_RASTERIZER_DISCARD);
   glBeginTransformFeedback(GL_POINTS);

@@ -13,7 +13,7 @@ namespace isohf::view {
 
 /// What the vertex shader made of one vertex, captured by transform feedback.
 struct ProbedVertex {
-  float x, y, z, w;  ///< from the tile's North-West corner and code 0, world units; w = 1
+  float x, y, z, w;  ///< from the North-West corner of tile (0, 0) and code 0, world units; w = 1
   float nx, ny, nz, distance;
   float object_x, object_z, code, shadow;
 };
@@ -33,8 +33,8 @@ class TileProbe {
   /// 0, count). gain is the slot's.
   void draw_shadow(const TileSlot& slot, bool voids, int level, const PixelWindow& window, float gain,
                    std::vector<float>& out);
-  /// All stored vertices; padding gets no sensible normal.
-  void capture(const TileSlot& slot, bool voids, std::vector<ProbedVertex>& out);
+  /// All stored vertices, drawn as those of `tile`; padding gets no sensible normal.
+  void capture(const TileSlot& slot, TileIndex tile, bool voids, std::vector<ProbedVertex>& out);
   [[nodiscard]] int width() const { return target_.width(); }  ///< pixels of a row of the pictures
 
  private:

@@ -36,7 +36,7 @@ class ShadowVerifier {
   void verify();
 
  private:
-  void verify_row(std::int64_t row, LightTravel travel, std::int64_t number);
+  void verify_row(std::int64_t row, LightTravel travel);
   void verify_tile(TileIndex tile, const RowSun& sun, std::size_t sun_number, std::vector<double>& entering);
   void check_vertices(TileIndex tile, const RowSun& sun);
   void check_share(TileIndex tile, const RowSun& sun, int level, const PixelWindow& window);
@@ -69,23 +69,17 @@ void ShadowVerifier::verify() {
   const TileGrid& grid = source_.grid();
   report_.suns_deg.assign(std::begin(kElevations_deg), std::end(kElevations_deg));
   const auto& wanted = context_.options.tiles;
-  std::int64_t number = 0;
   for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
     if (wanted && (row < wanted->first.row || row >= wanted->end.row)) continue;
-    if (row % context_.options.every != 0) continue;
-    verify_row(row, LightTravel::kEastward, number);
-    verify_row(row, LightTravel::kWestward, ++number);
+    verify_row(row, LightTravel::kEastward);
+    verify_row(row, LightTravel::kWestward);
     if (context_.options.progress) context_.options.progress("shadows", row + 1, grid.tile_rows());
   }
 }
 
-void ShadowVerifier::verify_row(std::int64_t row, LightTravel travel, std::int64_t number) {
+void ShadowVerifier::verify_row(std::int64_t row, LightTravel travel) {
   const TileGrid& grid = source_.grid();
-  std::vector<double> suns_deg;
-  for (std::size_t sun = 0; sun < report_.suns_deg.size(); ++sun) {
-    const auto count = static_cast<std::int64_t>(report_.suns_deg.size());
-    if (context_.has_turn(number, static_cast<std::int64_t>(sun), count)) suns_deg.push_back(report_.suns_deg[sun]);
-  }
+  const std::vector<double>& suns_deg = report_.suns_deg;
   const std::vector<double> dark(static_cast<std::size_t>(visible_rows(grid.shape())), kNoShadow);
   std::vector<std::vector<double>> entering(suns_deg.size(), dark);
   // As along the row, ground that lies beyond the source casts too.
@@ -126,10 +120,9 @@ void ShadowVerifier::verify_tile(TileIndex tile, const RowSun& sun, std::size_t 
   std::transform(cast_.depths.begin(), cast_.depths.end(), sampled_.begin(),
                  [](std::int16_t depth) { return static_cast<std::uint16_t>(depth + kDepthSteps); });
   slot_.upload_shadow(cast_.depths, cast_.gain);
-  probe_.capture(slot_, context_.has_voids(tile), captured_);
+  probe_.capture(slot_, {0, 0}, context_.has_voids(tile), captured_);
   check_vertices(tile, sun);
-  // Each tile at one level a sun, all levels in turn; every second one of many.
-  if (!context_.has_turn(tile.column, sun.travel == LightTravel::kEastward ? 0 : 1, 2)) return;
+  // Each tile at one level a sun, all levels in turn.
   const auto turn = static_cast<std::size_t>(tile.column + tile.row) + sun_number;
   const int level = static_cast<int>(turn % static_cast<std::size_t>(shape.levels()));
   for (const PixelWindow& window : context_.oracle.windows()) check_share(tile, sun, level, window);

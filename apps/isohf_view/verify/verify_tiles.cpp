@@ -36,8 +36,8 @@ class TileVerifier {
   /// What some tile said of a vertex that others store too.
   struct SharedVertex {
     std::uint16_t code = 0;
-    bool has_normal = false;
-    float nx = 0.0F, ny = 0.0F, nz = 0.0F;
+    bool is_visible = false;  ///< has a place and a normal
+    ProbedVertex drawn{};
     TileIndex tile{};
   };
 
@@ -55,14 +55,15 @@ class TileVerifier {
   bool voids_ = false;  ///< of the tile in hand
   std::vector<std::uint16_t> codes_;
   std::vector<Normal> normals_;
-  std::vector<ProbedVertex> captured_;
+  std::vector<ProbedVertex> captured_;  ///< drawn as tile (0, 0), whose places are exact enough
+  std::vector<ProbedVertex> placed_;    ///< drawn as the tile in hand
   std::vector<float> pixels_;
   std::unordered_map<std::uint64_t, SharedVertex> seen_;  ///< of the last two tile rows' rims
   std::int64_t seen_row_ = 0;
 };
 
 void TileVerifier::verify(TileIndex tile) {
-  const std::int64_t number = report_.tiles++;
+  ++report_.tiles;
   try {
     source_.read(tile, codes_);
   } catch (const Error& error) {
@@ -75,21 +76,15 @@ void TileVerifier::verify(TileIndex tile) {
   tile_normals(source_.grid(), View2D<const float>(heights.data(), shape.columns(), shape.rows()),
                View2D<Normal>(normals_.data(), shape.columns(), shape.rows()));
   voids_ = context_.has_voids(tile);
-  probe_.capture(slot_, voids_, captured_);
+  probe_.capture(slot_, {0, 0}, voids_, captured_);
+  probe_.capture(slot_, tile, voids_, placed_);
   check_vertices(tile);
   check_shared(tile);
   const int levels = shape.levels();
-  std::vector<double> transitions;
-  for (int level = 0; level + 1 < levels; ++level) {
-    for (const double fraction : context_.options.fractions) transitions.push_back(level + fraction);
-  }
-  const auto count = static_cast<std::int64_t>(transitions.size());
   for (const PixelWindow& window : context_.oracle.windows()) {
-    for (int level = 0; level < levels; ++level) {
-      if (context_.has_turn(number, level, levels)) check_level(tile, level, window);
-    }
-    for (std::int64_t i = 0; i < count; ++i) {
-      if (context_.has_turn(number, i, count)) check_transition(tile, transitions[static_cast<std::size_t>(i)], window);
+    for (int level = 0; level < levels; ++level) check_level(tile, level, window);
+    for (int level = 0; level + 1 < levels; ++level) {
+      for (const double fraction : context_.options.fractions) check_transition(tile, level + fraction, window);
     }
   }
 }
@@ -132,7 +127,7 @@ void TileVerifier::check_vertices(TileIndex tile) {
 }
 
 // Every stored vertex near the rim lies in a neighbour's array as well, padding included: the codes must be the same
-// and, where both see the vertex, the shader's normals must be the same bits.
+// and, if both see the vertex, the shader must give it the same place and normal, bit for bit.
 void TileVerifier::check_shared(TileIndex tile) {
   const TileGrid& grid = source_.grid();
   const TileShape& shape = grid.shape();
@@ -141,6 +136,7 @@ void TileVerifier::check_shared(TileIndex tile) {
     std::erase_if(seen_, [&](const auto& entry) { return entry.second.tile.row < tile.row - 1; });
   }
   Worst codes;
+  Worst places;
   Worst normals;
   for (int row = 0; row < shape.rows(); ++row) {
     const bool rim_row = row < 3 || row >= shape.rows() - 3;
@@ -149,32 +145,35 @@ void TileVerifier::check_shared(TileIndex tile) {
       if (row % 2 == 1 && column == shape.columns() - 1) continue;  // stored, but nobody's neighbour
       const GridVertex vertex{column, row};
       const auto i = static_cast<std::size_t>(row * shape.columns() + column);
-      SharedVertex here{codes_[i], is_visible(shape, vertex), 0.0F, 0.0F, 0.0F, tile};
-      if (here.has_normal) {
-        here.nx = captured_[i].nx;
-        here.ny = captured_[i].ny;
-        here.nz = captured_[i].nz;
-      }
+      const SharedVertex here{codes_[i], is_visible(shape, vertex), placed_[i], tile};
       const auto [found, fresh] = seen_.try_emplace(lattice_key(grid.lattice_vertex(tile, vertex)), here);
       if (fresh) continue;
       SharedVertex& there = found->second;
       ++report_.shared_vertices;
+      const ProbedVertex& a = here.drawn;
+      const ProbedVertex& b = there.drawn;
+      const bool both_visible = here.is_visible && there.is_visible;
       if (there.code != here.code) {
         codes.add(std::abs(there.code - here.code), [&] {
           return fmt::format("{}: code {}, tile ({},{}) stores {} at the same place", vertex_name(vertex), here.code,
                              there.tile.column, there.tile.row, there.code);
         });
-      } else if (there.has_normal && here.has_normal &&
-                 (there.nx != here.nx || there.ny != here.ny || there.nz != here.nz)) {
-        normals.add(std::max(std::abs(there.nx - here.nx), std::abs(there.nz - here.nz)), [&] {
-          return fmt::format("{}: normal ({}, {}, {}), in tile ({},{}) ({}, {}, {})", vertex_name(vertex), here.nx,
-                             here.ny, here.nz, there.tile.column, there.tile.row, there.nx, there.ny, there.nz);
+      } else if (both_visible && (a.x != b.x || a.y != b.y || a.z != b.z)) {
+        places.add(std::max({std::abs(a.x - b.x), std::abs(a.y - b.y), std::abs(a.z - b.z)}), [&] {
+          return fmt::format("{}: drawn at ({}, {}, {}), in tile ({},{}) at ({}, {}, {})", vertex_name(vertex), a.x,
+                             a.y, a.z, there.tile.column, there.tile.row, b.x, b.y, b.z);
+        });
+      } else if (both_visible && (a.nx != b.nx || a.ny != b.ny || a.nz != b.nz)) {
+        normals.add(std::max(std::abs(a.nx - b.nx), std::abs(a.nz - b.nz)), [&] {
+          return fmt::format("{}: normal ({}, {}, {}), in tile ({},{}) ({}, {}, {})", vertex_name(vertex), a.nx, a.ny,
+                             a.nz, there.tile.column, there.tile.row, b.nx, b.ny, b.nz);
         });
       }
-      if (!there.has_normal && here.has_normal) there = here;
+      if (!there.is_visible && here.is_visible) there = here;
     }
   }
   codes.report(report_, finding::kSharedVertex, tile, 0.0);
+  places.report(report_, finding::kDrawnCrack, tile, 0.0);
   if (!codes.any()) normals.report(report_, finding::kNormal, tile, 0.0);  // else these follow from the codes
 }
 
@@ -282,10 +281,7 @@ void verify_tiles(const CheckContext& context) {
   TileVerifier verifier(context);
   for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) {
     const TileIndex tile = grid.tile_at(flat);
-    if (!context.here.contains(tile) || (context.options.tiles && !context.options.tiles->contains(tile)) ||
-        (tile.column + tile.row) % context.options.every != 0) {
-      continue;
-    }
+    if (!context.here.contains(tile) || (context.options.tiles && !context.options.tiles->contains(tile))) continue;
     verifier.verify(tile);
     if (context.options.progress) context.options.progress("tiles", flat + 1, grid.tile_count());
   }

@@ -3,12 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <future>
 #include <limits>
 #include <map>
-#include <mutex>
 
-#include "gl/offscreen.h"
 #include "isohf/parts.h"
 
 namespace isohf::view {
@@ -125,74 +122,20 @@ void verify_mesh(const SharedGeometry& shared, ViewReport& report) {
   }
 }
 
-void ViewReport::add(const ViewReport& other) {
-  tiles += other.tiles;
-  pictures += other.pictures;
-  pixels += other.pixels;
-  vertices += other.vertices;
-  shared_vertices += other.shared_vertices;
-  seam_pixels += other.seam_pixels;
-  shadow_vertices += other.shadow_vertices;
-  if (suns_deg.empty()) suns_deg = other.suns_deg;
-  worst_shadow = std::max(worst_shadow, other.worst_shadow);
-  worst_share = std::max(worst_share, other.worst_share);
-  worst_height = std::max(worst_height, other.worst_height);
-  worst_normal = std::max(worst_normal, other.worst_normal);
-  for (const ViewFinding& finding : other.findings) add(finding);
-  failures += other.failures - static_cast<std::int64_t>(other.findings.size());
-}
-
 ViewReport verify_view(const TileSource& source, const IndexArrays& arrays, const ViewChecks& options) {
   const TileGrid& grid = source.grid();
   const isohf::TileRange all{{0, 0}, {grid.tile_columns(), grid.tile_rows()}};
   const isohf::TileRange here = source.metadata() != nullptr ? tiles_of(*source.metadata()) : all;
-  const isohf::TileRange seen = options.tiles ? intersection(here, *options.tiles) : here;
-  const bool takes_turns = seen.count() / options.every > kAllPictures;
-  ViewChecks wanted = options;
-  std::mutex telling;
-  if (options.progress) {
-    wanted.progress = [&](const char* what, std::int64_t done, std::int64_t count) {
-      const std::lock_guard lock(telling);
-      options.progress(what, done, count);
-    };
-  }
-  // Each with all that it draws by, in the context that is current.
-  const auto report_of = [&](const auto& check) {
-    ViewReport report;
-    report.is_part = !(here == all);
-    const SharedGeometry shared(grid.shape(), arrays);
-    MeshOracle oracle(grid.shape());
-    TileProbe probe(grid, shared, source.scale().scale);
-    check(CheckContext{source, shared, oracle, probe, wanted, here, takes_turns, report});
-    return report;
-  };
-  const auto check_tiles = [](const CheckContext& context) {
-    verify_mesh(context.shared, context.report);
-    verify_tiles(context);
-  };
+  ViewReport report;
+  report.is_part = !(here == all);
+  const SharedGeometry shared(grid.shape(), arrays);
+  MeshOracle oracle(grid.shape());
+  TileProbe probe(grid, shared, source.scale().scale);
+  const CheckContext context{source, shared, oracle, probe, options, here, report};
+  verify_mesh(shared, report);
+  verify_tiles(context);
   // Tiles that disagree shade each other in two ways, and so do those that are elsewhere.
-  const bool shadows = options.shadows && here == all;
-  if (!takes_turns) {
-    return report_of([&](const CheckContext& context) {
-      check_tiles(context);
-      if (shadows && context.report.passed()) verify_shadows(context);
-      if (options.seams) verify_seams(context);
-    });
-  }
-  const auto alone = [&](bool is_wanted, void (*check)(const CheckContext&)) {
-    return std::async(std::launch::async, [&, is_wanted, check] {
-      if (!is_wanted) return ViewReport();
-      const HeadlessContext gl;
-      return report_of(check);
-    });
-  };
-  std::future<ViewReport> of_shadows = alone(shadows, verify_shadows);
-  std::future<ViewReport> of_seams = alone(options.seams, verify_seams);
-  ViewReport report = report_of(check_tiles);
-  const bool agree = report.passed();
-  const ViewReport more = of_shadows.get();
-  if (agree) report.add(more);
-  report.add(of_seams.get());
+  if (options.shadows && !report.is_part && report.passed()) verify_shadows(context);
   return report;
 }
 

@@ -26,14 +26,10 @@ struct ViewFinding {
 
 struct ViewChecks {
   std::vector<double> fractions{0.25, 0.5, 0.8};  ///< β of the transitions looked at between each two levels
-  bool seams = true;
   bool shadows = true;
-  /// Only these tiles, the rows of their shadows, and seams near them.
+  /// Only these tiles, and the rows of their shadows.
   std::optional<isohf::TileRange> tiles;
-  /// Of them one in so many along each row and column, rows of shadows and blocks of seams; 1: all.
-  std::int64_t every = 1;
-  /// Called now and then with what is looked at, how much of it has been, and all of it; of several threads, one at a
-  /// time.
+  /// Called now and then with what is looked at, how much of it has been, and all of it.
   std::function<void(const char*, std::int64_t, std::int64_t)> progress;
 };
 
@@ -43,7 +39,6 @@ struct ViewReport {
   std::int64_t pixels = 0;    ///< compared with the library
   std::int64_t vertices = 0;
   std::int64_t shared_vertices = 0;  ///< compared between tiles
-  std::int64_t seam_pixels = 0;      ///< of oblique and perspective pictures
   std::int64_t shadow_vertices = 0;
   bool is_part = false;          ///< of an archive: shadows from its other tiles are not known, and not looked at
   std::vector<double> suns_deg;  ///< that shadows were looked at for, from either side
@@ -60,27 +55,19 @@ struct ViewReport {
     ++failures;
     if (findings.size() < kMaxFindings) findings.push_back(std::move(finding));
   }
-  /// Takes over what another check of the same archive has looked at and found.
-  void add(const ViewReport& other);
 };
 
 /// "shared vertices", ...: what a check looks at, by the id of its findings.
 [[nodiscard]] std::string check_name(int id);
 
 /// Draws every tile at every level, whole and fractional, through the buffers, shaders and index arrays that pictures
-/// are drawn with, and compares what comes back with the library's own arithmetic. A GL context must be current. Of more
-/// than kAllPictures tiles all vertices and index arrays are looked at, and pictures in turn: each tile at one level and
-/// in one transition, each row of shadows under one sun from either side, each block of seams at one pair of levels; tiles,
-/// shadows and seams then have a thread and a headless context each.
+/// are drawn with, and compares what comes back with the library's own arithmetic. A GL context must be current.
 ///
 /// arrays  what SharedGeometry uploads; make_index_arrays(shape) unless a fault is wanted
 /// The oracles never look at the arrays: level λ is the barycentric surface of a coarse tile. A tile that cannot be
 /// read is a finding; Errors of GL are thrown.
 [[nodiscard]] ViewReport verify_view(const TileSource& source, const IndexArrays& arrays,
                                      const ViewChecks& options = {});
-
-/// Tiles that are drawn at every level, in every transition and under every sun.
-inline constexpr std::int64_t kAllPictures = 64;
 
 // Inside of it, from here on.
 
@@ -92,13 +79,8 @@ struct CheckContext {
   TileProbe& probe;
   const ViewChecks& options;
   isohf::TileRange here;  ///< of an archive that is a part: nothing is said of the others
-  bool takes_turns;       ///< more than kAllPictures tiles are looked at
   ViewReport& report;
 
-  /// True where what comes `number`-th looks at `which` of `count` kinds of picture.
-  [[nodiscard]] bool has_turn(std::int64_t number, std::int64_t which, std::int64_t count) const {
-    return !takes_turns || number % count == which;
-  }
   /// True where a tile must be drawn with the shaders that discard voids.
   [[nodiscard]] bool has_voids(TileIndex tile) const {
     const TileBounds bounds = source.bounds(tile);
@@ -109,7 +91,7 @@ struct CheckContext {
 /// Reads the index arrays back from the GPU and checks each level's mesh, strip and stitch together: every side that is
 /// not on the tile's border must belong to two triangles that run along it in opposite directions, and what is left
 /// over must be the full-detail border, counter-clockwise, each side once. With that no crack can open between tiles
-/// whose border vertices agree, and no triangle faces down. Findings name tile (0, 0): all tiles share the arrays.
+/// whose border vertices are drawn in the same places, and no triangle faces down. Findings name tile (0, 0): all tiles share the arrays.
 void verify_mesh(const SharedGeometry& shared, ViewReport& report);
 
 /// The checks that need one tile at a time, and those between a tile and the ones before it.
@@ -119,16 +101,6 @@ void verify_tiles(const CheckContext& context);
 /// library from tile to tile along each row of tiles (paper section 3.13), and compared with what the shaders make of
 /// those that are swept.
 void verify_shadows(const CheckContext& context);
-
-/// Looks for cracks: draws blocks of neighbouring tiles at differing levels, slanted, and seeks background.
-///
-/// Seen by parallel light slanted along x, the surface over a line z = const is an unbroken curve X(x) = x + k·y. So
-/// every pixel between its two ends must be drawn, whatever the terrain does between them; likewise along z. A step of
-/// the ground at a seam opens a gap in one of the two directions of slant. Last, from an eye above the block whose
-/// whole view meets the ground inside it, every pixel must be drawn.
-/// Archives of up to 16 tiles meet every pair of levels in every block, those of up to kAllPictures every level on both
-/// sides of each seam, the pairs changing from block to block; larger ones one pair in a block.
-void verify_seams(const CheckContext& context);
 
 // Why tolerances are what they are: codes and unit normals pass through 32-bit interpolation, whose planes are told
 // from the picture's corner: an error of about spread·2^-21 for each pixel of distance, where spread is the difference

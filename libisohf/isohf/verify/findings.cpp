@@ -51,7 +51,7 @@ const std::vector<FindingKind>& finding_catalogue() {
       {finding::kDrawnNormal, Severity::kError, "inside a triangle the drawn normal is not the interpolated one"},
       {finding::kDrawnTransition, Severity::kError,
        "while one level of detail fades into the next, the drawn elevation is not the one that both levels give"},
-      {finding::kDrawnCrack, Severity::kError, "background shows between neighbouring tiles"},
+      {finding::kDrawnCrack, Severity::kError, "neighbouring tiles draw a shared vertex in two places"},
       {finding::kDrawnMesh, Severity::kError,
        "triangles of the index arrays do not join side to side, or do not meet the full-detail border"},
       {finding::kDrawnShadow, Severity::kError,
