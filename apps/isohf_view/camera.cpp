@@ -42,18 +42,12 @@ void Camera::look_at(Vec3 from, Vec3 target) {
   pitch_rad = std::clamp(std::asin(std::clamp(way.y / distance, -1.0, 1.0)), -kSteepest_rad, kSteepest_rad);
 }
 
-void Camera::turn(double heading_change_rad, double pitch_change_rad) {
-  heading_rad = whole_turn(heading_rad + heading_change_rad);
-  pitch_rad = std::clamp(pitch_rad + pitch_change_rad, -kSteepest_rad, kSteepest_rad);
-}
-
 void Camera::orbit(Vec3 about, double heading_change_rad, double pitch_change_rad) {
   const double before = pitch_rad;
-  const Vec3 axis = right();
-  turn(0.0, pitch_change_rad);
-  const Vec3 tilted = turned(eye - about, axis, pitch_rad - before);
+  pitch_rad = std::clamp(pitch_rad + pitch_change_rad, -kSteepest_rad, kSteepest_rad);
+  const Vec3 tilted = turned(eye - about, right(), pitch_rad - before);
   eye = about + turned(tilted, {0.0, -1.0, 0.0}, heading_change_rad);
-  turn(heading_change_rad, 0.0);
+  heading_rad = whole_turn(heading_rad + heading_change_rad);
 }
 
 Vec3 ray_through(const Camera& camera, const ViewState& view, double x, double y) {
@@ -80,13 +74,13 @@ Camera between(const Camera& from, const Camera& to, double share) {
   return out;
 }
 
-Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* target, Vec3 towards_eye) {
+Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* target) {
   const TileBounds whole = whole_bounds(source);
   const WorldBounds covered = source.covered();
   const double low = whole.low * view.exaggeration;
   const double high = whole.high * view.exaggeration;
   const Vec3 middle{0.5 * (covered.x0 + covered.x1), 0.5 * (low + high), 0.5 * (covered.z0 + covered.z1)};
-  const Vec3 way = normalised(towards_eye);
+  const Vec3 way = normalised({0.25, 0.62, 0.95});  // to the eye
   const Mat4 camera = look_along(-1.0 * way);
   const double half_y = std::tan(view.fov_y_rad / 2.0);
   const double half_x = half_y * view.width / view.height;

@@ -16,8 +16,6 @@ struct Camera {
 
   /// Looks from `from` at `target`.
   void look_at(Vec3 from, Vec3 target);
-  /// Turns the head.
-  void turn(double heading_change_rad, double pitch_change_rad);
   /// Walks round a point, which stays where it is on the screen. Stops short of straight up and down.
   void orbit(Vec3 about, double heading_change_rad, double pitch_change_rad);
 
@@ -33,14 +31,9 @@ struct Camera {
 /// Part of the way from one camera to another, 0...1, the short way round.
 [[nodiscard]] Camera between(const Camera& from, const Camera& to, double share);
 
-/// Ways to an eye from what it looks at.
-inline constexpr Vec3 kFromTheSouthEast = {0.25, 0.62, 0.95};
-inline constexpr Vec3 kFromAbove = {0.0, 1.0, 0.02};  ///< North up
-
-/// A camera that sees all that the source covers, as large as the view takes; what it looks at goes to `target` where
+/// A camera in the South-East that sees all that the source covers, as large as the view takes; what it looks at goes to `target` where
 /// wanted.
-[[nodiscard]] Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* target = nullptr,
-                                     Vec3 towards_eye = kFromTheSouthEast);
+[[nodiscard]] Camera overview_camera(const TileSource& source, const ViewState& view, Vec3* target = nullptr);
 
 /// 1, but where the heights of all are in no known proportion to the ground, or so low that nothing would be seen of
 /// them: 1, 2 or 5 times a power of ten.

@@ -142,7 +142,6 @@ void add_picture(CommandLine& line, Options& options) {
               [&](const std::string& text) { options.position = parse_place(text); });
   line.option("--look-at", "X,Y,Z", "Look there",
               [&](const std::string& text) { options.look_at = parse_place(text); });
-  line.flag("--fly", "Begin with the left button turning the head rather than dragging the ground", options.fly);
   line.option("--fov", "DEG", "Vertical field of view, 1 to 150 (default 50)", [&](const std::string& text) {
     options.view.fov_y_rad = cli::parse_number_in(text, 1.0, 150.0) * std::acos(-1.0) / 180.0;
   });

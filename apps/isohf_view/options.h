@@ -26,7 +26,6 @@ struct Options {
   bool legend = false;           ///< on pictures
   std::optional<Vec3> position;  ///< world units, y before exaggeration
   std::optional<Vec3> look_at;
-  bool fly = false;
   std::optional<SolarTime> date;  ///< the sun of that day and time
   std::optional<ShadePalette> palette;
   std::string palette_file;

@@ -9,7 +9,6 @@ namespace {
 constexpr double kWheelStep = 0.88;  ///< of the distance, a notch
 constexpr double kTurn_rad = 2.5;    ///< by a drag as long as the picture is high
 constexpr double kFlight_s = 0.45;   ///< that going somewhere takes
-constexpr double kFarthest = 12.0;   ///< from the middle of the data, in its diagonals
 constexpr double kLevelSine = 0.12;  ///< below that the ground is seen too flat to be dragged along its plane
 constexpr int kRowsSearched = 24;    ///< of the picture, below a cursor in the sky
 constexpr double kMostSteps = 64.0;  ///< of a frame of flight
@@ -83,17 +82,6 @@ void Steering::stay_above() {
   if (const auto ground = ground_under_eye()) camera_.eye.y = std::max(camera_.eye.y, *ground + clearance_);
 }
 
-/// Keeps the eye where the data can still be seen.
-void Steering::stay_near(Vec3 before) {
-  const WorldBounds covered = source_.covered();
-  const TileBounds& whole = ground_.whole();
-  const Vec3 size{covered.x1 - covered.x0, (whole.high - whole.low) * view_.exaggeration, covered.z1 - covered.z0};
-  const Vec3 middle{0.5 * (covered.x0 + covered.x1), 0.5 * (whole.low + whole.high) * view_.exaggeration,
-                    0.5 * (covered.z0 + covered.z1)};
-  const double now = length(camera_.eye - middle);
-  if (now > kFarthest * length(size) && now > length(before - middle)) camera_.eye = before;
-}
-
 void Steering::press(Drag kind, PicturePoint at) {
   flight_.reset();
   const Vec3 ground = hold(at);
@@ -106,26 +94,18 @@ void Steering::move(PicturePoint at) {
   const double dx = kTurn_rad * (at.x - drag_->last.x) / view_.height;
   const double dy = kTurn_rad * (at.y - drag_->last.y) / view_.height;
   drag_->last = at;
-  const Camera before = camera_;
-  switch (drag_->kind) {
-    case Drag::kPan:
-      pan(at);
-      break;
-    case Drag::kOrbit: {
-      camera_.orbit(drag_->ground, -dx, -dy);
-      const auto ground = ground_under_eye();
-      if (ground && camera_.eye.y < *ground + clearance_) {
-        camera_ = before;
-        camera_.orbit(drag_->ground, -dx, 0.0);
-      }
-      break;
+  if (drag_->kind == Drag::kPan) {
+    pan(at);
+  } else {
+    const Camera before = camera_;
+    camera_.orbit(drag_->ground, -dx, -dy);
+    const auto ground = ground_under_eye();
+    if (ground && camera_.eye.y < *ground + clearance_) {
+      camera_ = before;
+      camera_.orbit(drag_->ground, -dx, 0.0);
     }
-    case Drag::kLook:
-      camera_.turn(dx, -dy);
-      break;
   }
   stay_above();
-  stay_near(before.eye);
 }
 
 void Steering::pan(PicturePoint at) {
@@ -143,7 +123,6 @@ void Steering::pan(PicturePoint at) {
 
 void Steering::wheel(double steps, PicturePoint at) {
   flight_.reset();
-  const Vec3 before = camera_.eye;
   const Vec3 ground = hold(at);
   const Vec3 way = camera_.eye - ground;
   const double distance = length(way);
@@ -152,7 +131,6 @@ void Steering::wheel(double steps, PicturePoint at) {
   if (steps > 0.0) factor = std::max(factor, std::min(1.0, 2.0 * clearance_ / std::max(distance, 1e-300)));
   camera_.eye = ground + factor * way;
   stay_above();
-  stay_near(before);
 }
 
 void Steering::approach(PicturePoint at) {
@@ -161,18 +139,6 @@ void Steering::approach(PicturePoint at) {
   Camera target = camera_;
   const Vec3 way = camera_.eye - *ground;
   target.eye = *ground + std::max(0.3, std::min(1.0, 2.0 * clearance_ / std::max(length(way), 1e-300))) * way;
-  go_to(target);
-}
-
-void Steering::face_north() {
-  Camera target = camera_;
-  target.orbit(hold({0.5 * view_.width, 0.5 * view_.height}), -camera_.heading_rad, 0.0);
-  go_to(target);
-}
-
-void Steering::look_down() {
-  Camera target = camera_;
-  target.orbit(hold({0.5 * view_.width, 0.5 * view_.height}), 0.0, -4.0);
   go_to(target);
 }
 
@@ -194,11 +160,9 @@ void Steering::update(double seconds, Vec3 walk, double hurry) {
   const double step = 2.0 * source_.grid().sigma_x();
   const double steps = std::clamp(std::ceil(seconds * hurry * height_above_ground() / step), 1.0, kMostSteps);
   for (int i = 0; i < static_cast<int>(steps); ++i) {
-    const Vec3 before = camera_.eye;
     const double way = seconds / steps * hurry * height_above_ground();
-    camera_.eye = before + way * (walk.x * camera_.right() + Vec3{0.0, walk.y, 0.0} + walk.z * camera_.forward());
+    camera_.eye = camera_.eye + way * (walk.x * camera_.right() + Vec3{0.0, walk.y, 0.0} + walk.z * camera_.forward());
     stay_above();
-    stay_near(before);
   }
 }
 

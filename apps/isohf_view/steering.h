@@ -14,7 +14,7 @@ class Steering {
   /// All three outlive it; `view` says how large the picture is and how high heights are drawn.
   Steering(const TileSource& source, Ground& ground, Camera& camera, const ViewState& view);
 
-  enum class Drag { kPan, kOrbit, kLook };
+  enum class Drag { kPan, kOrbit };
   void press(Drag kind, PicturePoint at);
   void move(PicturePoint at);
   void release() { drag_.reset(); }
@@ -24,9 +24,6 @@ class Steering {
   void wheel(double steps, PicturePoint at);
   /// Two thirds of the way to what is under the cursor; nothing where there is no ground.
   void approach(PicturePoint at);
-  /// Turns about the middle of the picture until North is up, or until it is seen from above.
-  void face_north();
-  void look_down();
   /// Flies there.
   void go_to(const Camera& target);
 
@@ -65,7 +62,6 @@ class Steering {
   [[nodiscard]] std::optional<double> ground_under_eye();
   void pan(PicturePoint at);
   void stay_above();
-  void stay_near(Vec3 before);
 
   const TileSource& source_;
   Ground& ground_;

@@ -75,21 +75,19 @@ class Window {
 /// Keys and mouse onto a session. All comes by callback, so that no click is lost between two slow frames.
 class Controls {
  public:
-  Controls(GLFWwindow* window, Session& session, bool look)
+  Controls(GLFWwindow* window, Session& session)
       : window_(window),
         session_(session),
         ground_(session.source()),
         steering_(session.source(), ground_, session.camera, session.view),
-        start_(session.camera),
-        looks_(look) {
+        start_(session.camera) {
     glfwSetWindowUserPointer(window_, this);
     glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int) {
       of(w).changed_ = true;
       if (action == GLFW_PRESS) of(w).tapped_.insert(key);
       if (action != GLFW_RELEASE) of(w).press(key);
     });
-    glfwSetMouseButtonCallback(
-        window, [](GLFWwindow* w, int button, int action, int mods) { of(w).click(button, action, mods); });
+    glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int) { of(w).click(button, action); });
     glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) { of(w).move(x, y); });
     glfwSetScrollCallback(window, [](GLFWwindow* w, double, double steps) {
       of(w).changed_ = true;
@@ -216,7 +214,7 @@ class Controls {
     if (const auto hours = slider_hours()) session_.set_hours(*hours);
   }
 
-  void click(int button, int action, int mods) {
+  void click(int button, int action) {
     touched_ = true;
     if (action == GLFW_RELEASE) return slides_ = false, steering_.release();
     if (const auto hours = slider_hours(); hours && button == GLFW_MOUSE_BUTTON_LEFT) {
@@ -229,11 +227,7 @@ class Controls {
     last_click_s_ = button == GLFW_MOUSE_BUTTON_LEFT && !twice ? now : -1.0;
     last_click_ = cursor_;
     if (twice) return steering_.approach(cursor_);
-    const bool look = looks_ != ((mods & GLFW_MOD_ALT) != 0);
-    steering_.press(button != GLFW_MOUSE_BUTTON_LEFT ? Steering::Drag::kOrbit
-                    : look                           ? Steering::Drag::kLook
-                                                     : Steering::Drag::kPan,
-                    cursor_);
+    steering_.press(button == GLFW_MOUSE_BUTTON_LEFT ? Steering::Drag::kPan : Steering::Drag::kOrbit, cursor_);
   }
 
   [[nodiscard]] double screen_scale() const {
@@ -248,31 +242,16 @@ class Controls {
     return Hud::slider_hours(cursor_.x, cursor_.y, session_.view.width, session_.view.height, screen_scale());
   }
 
-  /// From as far as Home, or farther, on all that there is.
-  void look_down() {
-    Vec3 middle{};
-    const Camera home = overview_camera(session_.source(), session_.view, &middle);
-    const bool sees_all = length(session_.view.eye - middle) > 0.95 * length(home.eye - middle);
-    if (!sees_all) return steering_.look_down();
-    steering_.go_to(overview_camera(session_.source(), session_.view, nullptr, kFromAbove));
-  }
-
   void press(int key) {
     ViewState& view = session_.view;
     const auto toggle = [](bool& what) { what = !what; };
     switch (key) {
       case GLFW_KEY_ESCAPE:
         return glfwSetWindowShouldClose(window_, GLFW_TRUE);
-      case GLFW_KEY_C:
-        return toggle(looks_);
       case GLFW_KEY_R:
         return steering_.go_to(start_);
       case GLFW_KEY_HOME:
         return steering_.go_to(overview_camera(session_.source(), view));
-      case GLFW_KEY_N:
-        return steering_.face_north();
-      case GLFW_KEY_T:
-        return look_down();
       case GLFW_KEY_Y:
         return measure();
       case GLFW_KEY_O:
@@ -365,7 +344,6 @@ class Controls {
   Ground ground_;
   Steering steering_;
   Camera start_;
-  bool looks_;  ///< the left button turns the head
   PicturePoint cursor_;
   bool inside_ = false;                ///< the cursor, the window
   bool changed_ = true;                ///< what the picture shows
@@ -397,7 +375,7 @@ void run_window(const Options& options) {
   const Window window(options.view.width, options.view.height, fmt::format("isohf-view - {}", options.archive));
   require_gl();
   Session session(*source, options);
-  Controls controls(window.get(), session, options.fly);
+  Controls controls(window.get(), session);
   if (!options.overlay) controls.show_figures = Session::Figures::kNone;
   // What stands still is drawn with more samples than a moving picture where that takes its time.
   const std::array<int, 2> samples{options.samples.value_or(is_software_driver() ? 1 : kPictureSamples),

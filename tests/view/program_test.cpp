@@ -410,7 +410,7 @@ TEST_F(ViewProgramTest, IsSteeredByMouseAndKeys) {
     done
     for button in 1 2 3; do xdotool mousemove 160 120 mousedown $button mousemove 210 150 mousemove 120 90 mouseup $button; done
     xdotool mousemove 160 130 click --repeat 2 --delay 60 1 sleep 0.6
-    xdotool keydown w keydown Shift_L sleep 1.5 keyup Shift_L keyup w key n sleep 0.6 key t sleep 0.6
+    xdotool keydown w keydown Shift_L sleep 1.5 keyup Shift_L keyup w
     sleep 1
     ticks() { cut -d' ' -f14,15 /proc/$viewer/stat | tr ' ' + ; }
     before=$(($(ticks))) && sleep 4 && echo $(($(ticks) - before)) >"$4"
@@ -424,8 +424,6 @@ TEST_F(ViewProgramTest, IsSteeredByMouseAndKeys) {
   const auto end = nlohmann::json::parse(text("hand.json"));
   EXPECT_GT(end.at("height_above_ground").get<double>(), 0.0) << end;
   EXPECT_GT(end.at("triangles").get<std::int64_t>(), 0) << end;
-  EXPECT_NEAR(end.at("heading_deg").get<double>(), 0.0, 0.01) << end;
-  EXPECT_LT(end.at("pitch_deg").get<double>(), -89.0) << end;
   EXPECT_LE(std::stoi(text("ticks")), 4)
       << "an idle window takes no more than 1 % of a processor: 100 ticks are a second";
 }

@@ -103,38 +103,28 @@ TEST_F(RendererTest, NothingOfVoidsIsSeenInTheSky) {
   EXPECT_TRUE(std::equal(sky.begin(), sky.begin() + whole_rows, found.begin()));
 }
 
-TEST_F(RendererTest, OverviewsFromAnywhereHaveAllCornersInView) {
-  const test::MemoryTiles source(small_grid(), [](TileIndex, std::vector<std::uint16_t>&) {});
+TEST_F(RendererTest, OverviewsHaveAllCornersInView) {
+  const test::MemoryTiles source(small_grid());
   const WorldBounds ground = source.covered();
+  const TileBounds whole = whole_bounds(source);
   for (const auto& [width, height] : {std::pair{640, 360}, std::pair{300, 500}, std::pair{200, 80}}) {
-    for (const Vec3 way : {kFromTheSouthEast, kFromAbove}) {
-      ViewState view;
-      view.width = width;
-      view.height = height;
-      const Camera camera = overview_camera(source, view, nullptr, way);
-      PicturePoint low{1e9, 1e9};
-      PicturePoint high{-1e9, -1e9};
-      for (int corner = 0; corner < 8; ++corner) {
-        const TileBounds whole = whole_bounds(source);
-        const auto at = project(
-            camera, view, box_corner({ground.x0, whole.low, ground.z0}, {ground.x1, whole.high, ground.z1}, corner));
-        ASSERT_TRUE(at);
-        low = {std::min(low.x, at->x), std::min(low.y, at->y)};
-        high = {std::max(high.x, at->x), std::max(high.y, at->y)};
-      }
-      EXPECT_NEAR(low.x, width - high.x, 2.0) << "in the middle";
-      EXPECT_NEAR(low.y, height - high.y, 2.0) << "in the middle";
-      for (const double x : {ground.x0, ground.x1}) {
-        for (const double z : {ground.z0, ground.z1}) {
-          const Vec3 at = Vec3{x, 0.0, z} - camera.eye;
-          const double depth = dot(at, camera.forward());
-          const double half_y = std::tan(view.fov_y_rad / 2.0) * depth;
-          EXPECT_LT(std::abs(dot(at, camera.right())), half_y * width / height) << width << " " << x << " " << z;
-          EXPECT_LT(std::abs(dot(at, cross(camera.right(), camera.forward()))), half_y)
-              << width << " " << x << " " << z;
-        }
-      }
+    ViewState view;
+    view.width = width;
+    view.height = height;
+    const Camera camera = overview_camera(source, view);
+    PicturePoint low{1e9, 1e9};
+    PicturePoint high{-1e9, -1e9};
+    for (int corner = 0; corner < 8; ++corner) {
+      const auto at = project(
+          camera, view, box_corner({ground.x0, whole.low, ground.z0}, {ground.x1, whole.high, ground.z1}, corner));
+      ASSERT_TRUE(at);
+      low = {std::min(low.x, at->x), std::min(low.y, at->y)};
+      high = {std::max(high.x, at->x), std::max(high.y, at->y)};
     }
+    EXPECT_NEAR(low.x, width - high.x, 2.0) << "in the middle";
+    EXPECT_NEAR(low.y, height - high.y, 2.0) << "in the middle";
+    EXPECT_GT(low.x, 0.0) << width;
+    EXPECT_GT(low.y, 0.0) << width;
   }
 }
 

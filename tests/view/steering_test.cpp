@@ -132,16 +132,6 @@ TEST(Steering, SixtyNotchesEndAboveGroundWithGroundInView) {
   }
 }
 
-TEST(Steering, SixtyNotchesOutStayWithinSightOfTheData) {
-  Scene scene;
-  for (int notch = 0; notch < 60; ++notch) scene.hand.wheel(-1.0, {600.0, 400.0});
-  const PicturePoint middle =
-      scene.project({0.5 * steered_grid().world_width(), 0.0, 0.5 * steered_grid().world_height()});
-  EXPECT_GT(middle.x, 0.0);
-  EXPECT_LT(middle.x, scene.state.width);
-  EXPECT_LT(scene.camera.eye.y, 20.0 * (steered_grid().world_width() + steered_grid().world_height()));
-}
-
 TEST(Steering, TheWheelKeepsWhatIsUnderTheCursorThere) {
   Scene scene;
   const PicturePoint at{520.0, 340.0};
@@ -208,22 +198,6 @@ TEST(Steering, SpeedFollowsTheHeightAboveGround) {
     return length(scene.camera.eye - before);
   };
   EXPECT_NEAR(way_from(2000.0) / way_from(500.0), 4.0, 0.02);
-}
-
-TEST(Steering, NFacesNorthAndTLooksDownAboutTheMiddle) {
-  Scene scene;
-  const PicturePoint middle{0.5 * scene.state.width, 0.5 * scene.state.height};
-  const auto held = scene.hand.pick(middle);
-  ASSERT_TRUE(held);
-  scene.hand.face_north();
-  for (int i = 0; i < 100; ++i) scene.hand.update(0.02, {}, 1.0);
-  EXPECT_NEAR(scene.camera.heading_rad, 0.0, 1e-9);
-  EXPECT_NEAR(scene.project(*held).x, middle.x, 1e-6);
-  scene.hand.look_down();
-  for (int i = 0; i < 100; ++i) scene.hand.update(0.02, {}, 1.0);
-  EXPECT_LT(scene.camera.pitch_rad, -1.57);
-  EXPECT_NEAR(scene.project(*held).y, middle.y, 1e-6);
-  EXPECT_FALSE(scene.hand.is_flying());
 }
 
 TEST(Steering, GoingThereStopsShortOfTheGround) {
