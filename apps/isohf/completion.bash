@@ -43,7 +43,7 @@ _isohf() {
     *' --palette') values='elevation gray' ;;
     'experiment --fit') values='least-squares interpolate' ;;
     *' --texture-format') values='png jpeg' ;;
-    'view --mode') values='elevation plain levels strips texture normals' ;;
+    'view --mode') values='elevation levels strips texture normals' ;;
     'view --shadows') values='on off' ;;
   esac
   if [[ -n $values ]]; then

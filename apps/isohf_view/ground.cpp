@@ -50,9 +50,9 @@ double Ground::height_in(const Kept& tile, ObjectPoint point) const {
   return scale.offset + scale.scale * interpolate(barycentric(shape, point), codes);
 }
 
-std::optional<double> Ground::height(WorldPoint at, const WorldBounds& shown) {
+std::optional<double> Ground::height(WorldPoint at) {
   const TileGrid& grid = source_.grid();
-  if (!grid.contains(at) || !holds(shown, at)) return std::nullopt;
+  if (!grid.contains(at) || !holds(source_.covered(), at)) return std::nullopt;
   const TilePoint place = grid.locate(at);
   if (!source_.bounds(place.tile).stored) return std::nullopt;
   const double found = height_in(kept(place.tile), place.point);
@@ -87,15 +87,16 @@ std::optional<double> Ground::hit_in(const Kept& tile, const Ray& ray, double be
   return std::nullopt;
 }
 
-std::optional<Vec3> Ground::hit(Vec3 eye, Vec3 direction, double exaggeration, const WorldBounds& shown) {
+std::optional<Vec3> Ground::hit(Vec3 eye, Vec3 direction, double exaggeration) {
   if (!whole_.stored) return std::nullopt;
   const TileGrid& grid = source_.grid();
+  const WorldBounds covered = source_.covered();
   const Ray ray{eye, normalised(direction), exaggeration};
   const double slack = 1e-9 * (1.0 + std::abs(whole_.high) + std::abs(whole_.low)) * exaggeration;
   double begin = 0.0;
   double end = kNever;
-  cut_line(eye.x, ray.along.x, std::max(shown.x0, 0.0), std::min(shown.x1, grid.world_width()), begin, end);
-  cut_line(eye.z, ray.along.z, std::max(shown.z0, 0.0), std::min(shown.z1, grid.world_height()), begin, end);
+  cut_line(eye.x, ray.along.x, std::max(covered.x0, 0.0), std::min(covered.x1, grid.world_width()), begin, end);
+  cut_line(eye.z, ray.along.z, std::max(covered.z0, 0.0), std::min(covered.z1, grid.world_height()), begin, end);
   cut_line(eye.y, ray.along.y, whole_.low * exaggeration - slack, whole_.high * exaggeration + slack, begin, end);
   if (!(begin <= end) || end == kNever) return std::nullopt;
   const auto at = [&](double t) { return ray.from + t * ray.along; };

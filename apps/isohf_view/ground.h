@@ -19,14 +19,14 @@ class Ground {
   [[nodiscard]] const TileBounds& whole() const { return whole_; }
 
   /// Height at a place of `shown`, world units; nullopt where there is no surface.
-  [[nodiscard]] std::optional<double> height(WorldPoint at, const WorldBounds& shown);
+  [[nodiscard]] std::optional<double> height(WorldPoint at);
 
   /// The most that the ground may reach up at a place, without a look at a tile; nullopt where nothing is stored.
   [[nodiscard]] std::optional<double> highest(WorldPoint at) const;
 
-  /// Where a ray first meets the surface within `shown`; heights are those drawn, `exaggeration` times as high.
+  /// The place where a ray first meets the surface; heights are those drawn, `exaggeration` times as high.
   /// direction  need not be a unit vector
-  [[nodiscard]] std::optional<Vec3> hit(Vec3 eye, Vec3 direction, double exaggeration, const WorldBounds& shown);
+  [[nodiscard]] std::optional<Vec3> hit(Vec3 eye, Vec3 direction, double exaggeration);
 
  private:
   struct Kept {

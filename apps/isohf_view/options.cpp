@@ -158,16 +158,16 @@ void add_picture(CommandLine& line, Options& options) {
                 constexpr int kSamples[] = {1, 2, 4, 8};
                 options.samples = kSamples[cli::parse_word(text, {"1", "2", "4", "8"})];
               });
-  line.option("--mode", "NAME",
-              "Colour by elevation, plain, levels, strips, texture or normals (default: texture where the archive has "
-              "textures, else elevation)",
-              [&](const std::string& text) {
-                constexpr ColourMode kModes[] = {ColourMode::kElevation, ColourMode::kPlain,   ColourMode::kLevels,
-                                                 ColourMode::kStrips,    ColourMode::kTexture, ColourMode::kNormals};
-                options.view.mode =
-                    kModes[cli::parse_word(text, {"elevation", "plain", "levels", "strips", "texture", "normals"})];
-                options.mode_given = true;
-              });
+  line.option(
+      "--mode", "NAME",
+      "Colour by elevation, levels, strips, texture or normals (default: texture where the archive has "
+      "textures, else elevation)",
+      [&](const std::string& text) {
+        constexpr ColourMode kModes[] = {ColourMode::kElevation, ColourMode::kLevels, ColourMode::kStrips,
+                                         ColourMode::kTexture, ColourMode::kNormals};
+        options.view.mode = kModes[cli::parse_word(text, {"elevation", "levels", "strips", "texture", "normals"})];
+        options.mode_given = true;
+      });
   line.option("--palette", "NAME|FILE",
               "Colours of elevations: elevation, gray, mars (default: its body's), or a text file of elevations and "
               "colours as for gdaldem color-relief",
@@ -186,9 +186,6 @@ void add_picture(CommandLine& line, Options& options) {
   line.option("--triangle-size", "A", "Draw triangles of about A square pixels (default 4): more is coarser and faster",
               [&](const std::string& text) { options.view.triangle_px = cli::parse_number_in(text, 0.01, 1e6); });
   line.flag("--wireframe", "Draw the triangles' sides", options.view.wireframe);
-  line.flag("--borders", "Draw the tiles' borders", options.view.borders);
-  line.flag("--beyond", "Show tiles beyond the source's edge as well", options.view.beyond);
-  line.flag("--switch", "Switch levels of detail at once instead of fading", options.view.plain_switching);
 }
 
 }  // namespace
@@ -197,7 +194,6 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   Options options;
   bool window = false;
   bool verify = false;
-  bool no_haze = false;
   bool no_overlay = false;
   std::optional<double> time;
   CommandLine line("view", "Views an archive of an isometric heightfield, or draws and checks it without a screen.");
@@ -206,7 +202,6 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
                   "Archive to view, or a raster: it is converted for as long as it is looked at", options.archive);
   add_actions(line, options, window, verify);
   add_picture(line, options);
-  line.flag("--no-haze", "Leave out the haze towards the far distance", no_haze);
   line.flag("--no-overlay", "Leave out what a window writes over the picture", no_overlay);
   line.flag("--legend", "Write scale bar, North arrow and the colours' legend on pictures", options.legend);
   add_light(line, options, time);
@@ -236,7 +231,6 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
     line.fail("--look-at is the place of --position, which gives no direction; name another place");
   }
   if (!options.probe.empty()) options.action = Options::Action::kProbe;
-  options.view.haze = !no_haze;
   options.overlay = !no_overlay;
   if (!options.screenshot.empty() && !window) options.action = Options::Action::kScreenshot;
   if (verify) options.action = Options::Action::kVerify;

@@ -76,7 +76,7 @@ void set_light(const TerrainProgram& program, const ViewState& view, const Air& 
   set_vec3(program.uniform("sky_light"), std::clamp(sun.y * 6.0 + 0.25, 0.12, 1.0) * air.light);
   set_vec3(program.uniform("horizon"), by_day(air.horizon, sun));
   const double haze_begin = 0.55 * view.far_distance;
-  const double haze_rise = view.haze ? 1.0 / (view.far_distance - haze_begin) : 0.0;
+  const double haze_rise = 1.0 / (view.far_distance - haze_begin);
   glUniform2f(program.uniform("haze"), static_cast<float>(haze_begin), static_cast<float>(haze_rise));
 }
 
@@ -215,28 +215,24 @@ void Renderer::set_palette(const std::vector<ColourStop>& stops, double low, dou
 }
 
 const TerrainProgram& Renderer::shading(const ViewState& view, bool is_rim) {
-  const std::tuple key{view.mode, view.borders, is_rim};
+  const std::pair key{view.mode, is_rim};
   const auto found = shading_.find(key);
   if (found != shading_.end()) return found->second;
-  const std::string fragment = terrain_fragment_shader(is_rim, view.mode, view.borders);
-  return shading_.try_emplace(key, "terrain", is_rim, fragment).first->second;
+  return shading_.try_emplace(key, "terrain", is_rim, terrain_fragment_shader(is_rim, view.mode)).first->second;
 }
 
 double Renderer::level_of(const ViewState& view, PlaneTile at) const {
   const TileGrid& grid = planes_.grid(at.plane);
   const int levels = planes_.levels();
-  double level = 0.0;
   if (view.fixed_level) {
     const bool second = view.other_level && (at.tile.column + at.tile.row) % 2 != 0;
-    level = std::clamp(second ? *view.other_level : *view.fixed_level, 0.0, static_cast<double>(levels - 1));
-  } else {
-    // Section 3.9, with the straight distance in place of camera-space depth: turning the head changes no mesh.
-    const TileVolume box = tile_volume(grid, at.tile, source_.plane(at.plane).bounds(at.tile), view);
-    const double distance = at.plane == 0 ? length(0.5 * (box.low + box.high)) : box.distance();
-    level = fractional_level(projected_area_px(triangle_area(source_.grid(), 1.0), view.focal_px(), distance), levels,
-                             view.triangle_px * view.coarser);
+    return std::clamp(second ? *view.other_level : *view.fixed_level, 0.0, static_cast<double>(levels - 1));
   }
-  return view.plain_switching ? std::round(level) : level;
+  // Section 3.9, with the straight distance in place of camera-space depth: turning the head changes no mesh.
+  const TileVolume box = tile_volume(grid, at.tile, source_.plane(at.plane).bounds(at.tile), view);
+  const double distance = at.plane == 0 ? length(0.5 * (box.low + box.high)) : box.distance();
+  return fractional_level(projected_area_px(triangle_area(source_.grid(), 1.0), view.focal_px(), distance), levels,
+                          view.triangle_px * view.coarser);
 }
 
 void Renderer::find_visible(Frame& frame, const TileRange& top, const ResidentTile& resident) const {
@@ -258,7 +254,7 @@ void Renderer::find_visible(Frame& frame, const TileRange& top, const ResidentTi
       ++frame.figures.absent_tiles;
       continue;
     }
-    const bool is_cut = !view.beyond && reaches_beyond(grid, at.tile, source_.covered());
+    const bool is_cut = reaches_beyond(grid, at.tile, source_.covered());
     const LodBlend blend = lod_blend(own_level(at), planes_.mesh_shape().levels());
     GLuint texture = 0;
     if (view.mode == ColourMode::kTexture) {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "gl/terrain_program.h"
@@ -108,7 +108,7 @@ class Renderer {
   TileBounds whole_;
   Air air_;
   DepthOrder order_ = best_depth_order();
-  std::map<std::tuple<ColourMode, bool, bool>, TerrainProgram> shading_;  ///< by mode, borders, rim
+  std::map<std::pair<ColourMode, bool>, TerrainProgram> shading_;  ///< by mode, rim
   std::vector<PlaneTile> drawn_;
   TerrainPrograms flat_;
   Program sky_;

@@ -42,20 +42,17 @@ TileBoxLimits limits_from(const TileSource& source, const Options& options) {
 const std::vector<std::string> kHelpLines{"left drag    move the ground         wheel         zoom",
                                           "right drag   orbit                   double click  fly there",
                                           "W A S D      fly, arrows too         Q E           down, up",
-                                          "Shift, Ctrl  faster, slower",
+                                          "Shift, Ctrl  faster, slower          [ ]           far distance",
                                           "Home         the whole terrain       R             first view",
                                           "J L          turn the sun            I K           raise, lower it",
                                           "O            sun of a day            , .           earlier, later",
-                                          "U            shadows                 Z             haze",
+                                          "U            shadows                 X             wireframe",
                                           "M            colours                 + -           exaggeration",
-                                          "Y            measure from, to",
-                                          "X            wireframe               B             tile borders",
-                                          "G            fade or switch levels   V             beyond the source",
-                                          "[ ]          far distance            F             more, no figures",
+                                          "Y            measure from, to        F             more, no figures",
                                           "P            save a picture          H, Esc        help, quit"};
 
 const char* mode_name(ColourMode mode) {
-  constexpr const char* kNames[] = {"elevation", "plain", "levels of detail", "strip order", "texture", "normals"};
+  constexpr const char* kNames[] = {"elevation", "levels of detail", "strip order", "texture", "normals"};
   return kNames[static_cast<std::size_t>(mode)];
 }
 
@@ -132,8 +129,7 @@ Session::Session(const TileSource& source, const Options& options)
 }
 
 std::vector<ColourMode> Session::modes() const {
-  std::vector<ColourMode> modes{ColourMode::kElevation, ColourMode::kPlain, ColourMode::kLevels, ColourMode::kStrips,
-                                ColourMode::kNormals};
+  std::vector<ColourMode> modes{ColourMode::kElevation, ColourMode::kLevels, ColourMode::kStrips, ColourMode::kNormals};
   if (textures_) modes.insert(modes.begin(), ColourMode::kTexture);
   return modes;
 }

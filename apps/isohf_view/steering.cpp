@@ -31,13 +31,8 @@ Vec3 Steering::ray(PicturePoint at) const {
   return ray_through(camera_, view_, 2.0 * at.x / view_.width - 1.0, 1.0 - 2.0 * at.y / view_.height);
 }
 
-WorldBounds Steering::shown() const {
-  const TileGrid& grid = source_.grid();
-  return view_.beyond ? WorldBounds{0.0, 0.0, grid.world_width(), grid.world_height()} : source_.covered();
-}
-
 std::optional<Vec3> Steering::pick(PicturePoint at) {
-  return ground_.hit(camera_.eye, ray(at), view_.exaggeration, shown());
+  return ground_.hit(camera_.eye, ray(at), view_.exaggeration);
 }
 
 Vec3 Steering::hold(PicturePoint at) {
@@ -49,7 +44,7 @@ Vec3 Steering::hold(PicturePoint at) {
       if (const auto there = pick({x, y})) return *there;
     }
   }
-  const WorldBounds covered = shown();
+  const WorldBounds covered = source_.covered();
   const TileBounds& whole = ground_.whole();
   return {0.5 * (covered.x0 + covered.x1), 0.5 * (whole.low + whole.high) * view_.exaggeration,
           0.5 * (covered.z0 + covered.z1)};
@@ -69,7 +64,7 @@ std::optional<double> Steering::ground_under_eye() {
   if (camera_.eye.y > *highest * view_.exaggeration + 4.0 * source_.grid().extent_x()) {
     return *highest * view_.exaggeration;
   }
-  const auto height = ground_.height(at, shown());
+  const auto height = ground_.height(at);
   return height ? std::optional(*height * view_.exaggeration) : std::nullopt;
 }
 

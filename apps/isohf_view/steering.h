@@ -58,7 +58,6 @@ class Steering {
     double share;
   };
   [[nodiscard]] Vec3 ray(PicturePoint at) const;
-  [[nodiscard]] WorldBounds shown() const;
   [[nodiscard]] std::optional<double> ground_under_eye();
   void pan(PicturePoint at);
   void stay_above();

@@ -8,7 +8,7 @@
 namespace isohf::view {
 
 /// How the ground is coloured; the numbers are the terrain fragment shader's.
-enum class ColourMode { kElevation = 0, kPlain = 1, kLevels = 2, kStrips = 3, kTexture = 4, kNormals = 5 };
+enum class ColourMode { kElevation = 0, kLevels = 1, kStrips = 2, kTexture = 3, kNormals = 4 };
 
 /// All that a picture depends on besides the tiles.
 struct ViewState {
@@ -21,14 +21,10 @@ struct ViewState {
   bool shadows = false;           ///< draws those that the tiles have
   ColourMode mode = ColourMode::kElevation;
   bool wireframe = false;
-  bool borders = false;
-  bool haze = true;
-  bool beyond = false;                ///< shows tiles beyond the source's edge as well
   std::optional<double> fixed_level;  ///< draws every tile at this fractional level
   std::optional<double> other_level;  ///< of every second tile, like a chessboard; with fixed_level
   double triangle_px = 4.0;           ///< area that triangles are meant to have, pixels (section 3.9)
   double coarser = 1.0;               ///< times triangle_px while a slow renderer has to follow a moving hand; >= 1
-  bool plain_switching = false;       ///< rounds the level instead of fading: for comparison
   int width = 1280;                   ///< pixels
   int height = 720;
 

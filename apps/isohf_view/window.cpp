@@ -260,16 +260,8 @@ class Controls {
         return next_mode();
       case GLFW_KEY_X:
         return toggle(view.wireframe);
-      case GLFW_KEY_B:
-        return toggle(view.borders);
-      case GLFW_KEY_G:
-        return toggle(view.plain_switching);
       case GLFW_KEY_U:
         return toggle(session_.shadows);
-      case GLFW_KEY_V:
-        return toggle(view.beyond);
-      case GLFW_KEY_Z:
-        return toggle(view.haze);
       case GLFW_KEY_H:
       case GLFW_KEY_F1:
         return toggle(show_help);

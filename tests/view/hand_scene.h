@@ -24,7 +24,7 @@ struct HandScene {
 
   /// How far the eye stands above the ground; infinite beside the data.
   [[nodiscard]] double height() {
-    const auto below = ground.height({camera.eye.x, camera.eye.z}, tiles_.covered());
+    const auto below = ground.height({camera.eye.x, camera.eye.z});
     return below ? camera.eye.y - *below * state.exaggeration : std::numeric_limits<double>::infinity();
   }
   /// Where a point of the world lies in the picture.

@@ -50,7 +50,7 @@ TEST(Place, HasTheHeightsOfTheTriangles) {
   Ground ground(source);
   const Place place = probe(source, ground, {123.0, 45.0});
   ASSERT_TRUE(place.elevation);
-  EXPECT_DOUBLE_EQ(*place.elevation, *ground.height({123.0, 45.0}, source.covered()));
+  EXPECT_DOUBLE_EQ(*place.elevation, *ground.height({123.0, 45.0}));
   EXPECT_EQ(json_of(place).at("elevation").get<double>(), *place.elevation) << "rounded is what people read";
   EXPECT_FALSE(probe(source, ground, {-1.0, 45.0}).elevation);
   EXPECT_TRUE(json_of(probe(source, ground, {-1.0, 45.0})).at("elevation").is_null());
@@ -58,8 +58,8 @@ TEST(Place, HasTheHeightsOfTheTriangles) {
   EXPECT_EQ(json_of(place).at("state"), "ground");
   const Profile profile = profile_between(source, ground, {10.0, 10.0}, {250.0, 190.0});
   EXPECT_DOUBLE_EQ(profile.length, 300.0);
-  EXPECT_DOUBLE_EQ(profile.heights.front(), *ground.height({10.0, 10.0}, source.covered()));
-  EXPECT_DOUBLE_EQ(profile.heights.back(), *ground.height({250.0, 190.0}, source.covered()));
+  EXPECT_DOUBLE_EQ(profile.heights.front(), *ground.height({10.0, 10.0}));
+  EXPECT_DOUBLE_EQ(profile.heights.back(), *ground.height({250.0, 190.0}));
 }
 
 TEST(Place, IsNamedInAllItsWays) {

@@ -100,9 +100,7 @@ TEST_F(PlanePictureTest, HasNoHolesAndNoMoreTrianglesThanItNeeds) {
     Options options;
     options.view.width = 480;
     options.view.height = 320;
-    options.view.haze = false;
     options.view.triangle_px = 60.0;
-    options.view.mode = ColourMode::kPlain;
     options.exaggeration = 4.0;
     options.position = Vec3{eye.x, eye.y / 4.0, eye.z};
     options.look_at = Vec3{target.x, target.y / 4.0, target.z};

@@ -177,7 +177,6 @@ TEST_F(RendererTest, FadesBetweenLevelsWithoutJumps) {
   Options options;
   options.view.width = 320;
   options.view.height = 240;
-  options.view.haze = false;
   options.exaggeration = 3.0;
   options.position = Vec3{1200.0, 140.0, 100.0};
   options.look_at = Vec3{1300.0, 60.0, 900.0};

@@ -19,10 +19,6 @@ TileGrid steered_grid() {
   return TileGrid::make(TileShape::make(28, 27, 3), 5, 4, 600.0, 600.0);
 }
 
-WorldBounds all(const TileGrid& of) {
-  return {0.0, 0.0, of.world_width(), of.world_height()};
-}
-
 struct OwnTiles {
   explicit OwnTiles(const MemoryTiles::Alter& alter) : tiles(steered_grid(), alter) {}
   MemoryTiles tiles;
@@ -53,7 +49,7 @@ TEST(Ground, HeightsAreThoseOfTheTriangles) {
   std::uniform_real_distribution<double> z(0.0, steered_grid().world_height());
   for (int i = 0; i < 300; ++i) {
     const WorldPoint at{x(random), z(random)};
-    const auto found = scene.ground.height(at, all(steered_grid()));
+    const auto found = scene.ground.height(at);
     ASSERT_TRUE(found);
     EXPECT_NEAR(*found, barycentric_height(scene.tiles, at), 1e-9);
   }
@@ -89,7 +85,7 @@ TEST(Ground, ARayMeetsTheSurfaceWhereItFirstCrossesIt) {
                    share(random) * steered_grid().world_height()};
     const Vec3 along = normalised(Vec3{share(random) - 0.5, -0.9 * share(random), share(random) - 0.5});
     const auto expected = first_meeting(scene, eye, along, 4.0, 5000.0);
-    const auto found = scene.ground.hit(eye, along, scene.state.exaggeration, all(steered_grid()));
+    const auto found = scene.ground.hit(eye, along, scene.state.exaggeration);
     ASSERT_EQ(found.has_value(), expected.has_value()) << "ray " << i;
     if (!found) continue;
     ++met;
@@ -105,7 +101,7 @@ TEST(Ground, ARayAlongARowASlantOrStraightDownMeetsTheSurface) {
        {Vec3{0.0, -1.0, 0.0}, Vec3{step, -4.0 * step, 0.0}, Vec3{0.0, -4.0 * step, step},
         Vec3{step, -4.0 * step, steered_grid().sigma_z()}, Vec3{-step, -4.0 * step, steered_grid().sigma_z()}}) {
     const Vec3 eye{1200.0, 1500.0, 12.0 * steered_grid().sigma_z()};
-    const auto found = scene.ground.hit(eye, along, scene.state.exaggeration, all(steered_grid()));
+    const auto found = scene.ground.hit(eye, along, scene.state.exaggeration);
     ASSERT_TRUE(found) << along.x << " " << along.y << " " << along.z;
     EXPECT_NEAR(found->y, scene.state.exaggeration * barycentric_height(scene.tiles, {found->x, found->z}), 1e-6);
   }
@@ -114,8 +110,8 @@ TEST(Ground, ARayAlongARowASlantOrStraightDownMeetsTheSurface) {
 TEST(Ground, ARayGoesThroughVoids) {
   Scene scene(
       [](TileIndex, std::vector<std::uint16_t>& codes) { std::fill(codes.begin(), codes.end(), view::kVoidCode); });
-  EXPECT_FALSE(scene.ground.hit({100.0, 1e4, 100.0}, {0.0, -1.0, 0.0}, 1.0, all(steered_grid())));
-  EXPECT_FALSE(scene.ground.height({100.0, 100.0}, all(steered_grid())));
+  EXPECT_FALSE(scene.ground.hit({100.0, 1e4, 100.0}, {0.0, -1.0, 0.0}, 1.0));
+  EXPECT_FALSE(scene.ground.height({100.0, 100.0}));
 }
 
 TEST(Steering, SixtyNotchesEndAboveGroundWithGroundInView) {
@@ -191,7 +187,7 @@ TEST(Steering, HalfAMinuteOfFlightNeverEntersTheGround) {
 TEST(Steering, SpeedFollowsTheHeightAboveGround) {
   const auto way_from = [](double height) {
     Scene scene;
-    const double ground = 8.0 * *scene.ground.height({1500.0, 1200.0}, all(steered_grid()));
+    const double ground = 8.0 * *scene.ground.height({1500.0, 1200.0});
     scene.camera.look_at({1500.0, ground + height, 1200.0}, {2500.0, ground + height, 1200.0});
     const Vec3 before = scene.camera.eye;
     scene.hand.update(0.01, {1.0, 0.0, 0.0}, 1.0);

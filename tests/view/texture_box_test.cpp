@@ -99,7 +99,6 @@ Options looking_down_options(int width, int height) {
   Options options;
   options.view.width = width;
   options.view.height = height;
-  options.view.haze = false;
   options.exaggeration = 1.0;
   options.sun_elevation_deg = 12.0;  // light that leaves white below 255, the same everywhere on a plain
   return options;

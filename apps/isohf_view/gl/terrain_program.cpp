@@ -134,7 +134,7 @@ uniform float shadow_gain;      // part of the sun that 1 hides; 0: no shadows
 float sun_share() { return clamp(1.0 - v_place.w * shadow_gain, 0.0, 1.0); }
 )glsl";
 
-// MODE as in view_state.h: 0 elevation colours, 1 plain, 2 levels of detail, 3 strip order, 4 texture, 5 normals. Each
+// MODE as in view_state.h: 0 elevation colours, 1 levels of detail, 2 strip order, 3 texture, 4 normals. Each
 // mode is a program of its own, and what does not change from pixel to pixel comes as a uniform: a software rasteriser
 // takes every branch and repeats every sum in every pixel.
 constexpr const char* kTerrainFragment = R"glsl(
@@ -146,30 +146,30 @@ uniform int level;              // of the mesh in hand
 uniform bool is_stitch;
 uniform vec3 level_colour;
 uniform float alpha;
-uniform vec2 object_size;       // 2(C-4), R-3
+uniform float row_length;       // 2(C-4)
 uniform vec2 ramp;              // code at the ramp's foot, 1/codes of its height
 uniform vec3 sun;               // towards the sun
 uniform vec3 sun_light;         // on ground that faces it
 uniform vec3 sky_light;         // on level ground
-uniform vec2 haze;              // distance where it begins, 1/distance to where it is complete; y = 0: none
+uniform vec2 haze;              // distance where it begins, 1/distance to where it is complete
 uniform vec3 horizon;
 uniform sampler2D palette;      // colours along the ramp, to the power of 1.6
 uniform sampler2D tile_texture; // colours as coded, multiplied by alpha
 uniform vec4 texture_place;     // texture coordinates = object space * xy + zw
 float sun_share();
 
-#if MODE == 0 || MODE == 4
+#if MODE == 0 || MODE == 3
 vec3 hypsometric() { return texture(palette, vec2((v_place.z - ramp.x) * ramp.y, 0.5)).rgb; }
 #endif
 
-#if MODE == 3
+#if MODE == 2
 // The paper's Fig. 6: even rows of triangles red, drawn from East to West, odd rows blue, from West to East; the
 // colour deepens along the way and every second triangle is lighter.
 vec3 strip_colour() {
   if (is_stitch) return vec3(0.95, 0.85, 0.25);
   float row = floor(v_place.y / exp2(float(level)));
   bool red = mod(row, 2.0) < 0.5;
-  float way = clamp(v_place.x / object_size.x, 0.0, 1.0);
+  float way = clamp(v_place.x / row_length, 0.0, 1.0);
   if (red) way = 1.0 - way;
   vec3 base = red ? mix(vec3(1.0, 0.75, 0.65), vec3(0.75, 0.10, 0.10), way)
                   : mix(vec3(0.70, 0.82, 1.0), vec3(0.10, 0.20, 0.75), way);
@@ -177,37 +177,31 @@ vec3 strip_colour() {
 }
 #endif
 
+#if MODE != 4
 vec3 base_colour() {
 #if MODE == 0
   return hypsometric();
-#elif MODE == 2
+#elif MODE == 1
   return level_colour;
-#elif MODE == 3
+#elif MODE == 2
   return strip_colour();
-#elif MODE == 4
+#else
   // Under full light a photo shows its own colours: the power of 1/1.6 below is undone. Where there is no photo the
   // texture has no alpha.
   vec4 photo = texture(tile_texture, v_place.xy * texture_place.xy + texture_place.zw);
   vec3 own = pow(min(photo.rgb / max(photo.a, 0.004), 1.0), vec3(1.6));
   return mix(hypsometric(), own, photo.a);
-#else
-  return vec3(0.80, 0.79, 0.76);
 #endif
 }
+#endif
 
 void main() {
   DISCARD_VOID;
   vec3 normal = normalize(v_facing.xyz);
-#if MODE == 5
+#if MODE == 4
   vec3 shown = normal * 0.5 + 0.5;
 #else
   vec3 base = base_colour();
-#ifdef BORDERS
-  vec2 inside = min(v_place.xy, object_size - v_place.xy);
-  vec2 width = max(fwidth(v_place.xy), vec2(1e-6));
-  float edge = min(inside.x / width.x, inside.y / width.y);
-  base = mix(vec3(0.05, 0.05, 0.08), base, clamp(edge - 0.5, 0.25, 1.0));
-#endif
   float direct = max(dot(normal, sun), 0.0) * sun_share();
   vec3 shown = base * (sky_light * (0.5 + 0.5 * normal.y) + sun_light * direct);
 #endif
@@ -252,9 +246,9 @@ void main() {
 
 }  // namespace
 
-std::string terrain_fragment_shader(bool rim, ColourMode mode, bool borders) {
-  return header(rim) + "#define MODE " + std::to_string(static_cast<int>(mode)) + "\n" +
-         (borders ? "#define BORDERS\n" : "") + kDiscardVoid + kTerrainFragment + kSunShare;
+std::string terrain_fragment_shader(bool rim, ColourMode mode) {
+  return header(rim) + "#define MODE " + std::to_string(static_cast<int>(mode)) + "\n" + kDiscardVoid +
+         kTerrainFragment + kSunShare;
 }
 std::string probe_fragment_shader(bool rim) {
   return header(rim) + kDiscardVoid + kProbeFragment;
@@ -280,7 +274,7 @@ void TerrainProgram::begin(const TileGrid& grid, const TerrainFrame& frame) cons
   glUniform1i(uniform("codes"), 2);
   glUniform2i(uniform("last_xz"), 2 * grid.shape().cell_columns(), grid.shape().cell_rows());
   set_vec2("sigma", grid.sigma_x(), grid.sigma_z());
-  set_vec2("object_size", 2.0 * grid.shape().cell_columns(), grid.shape().cell_rows());
+  glUniform1f(uniform("row_length"), static_cast<float>(2 * grid.shape().cell_columns()));
   glUniform3f(uniform("anchor"), static_cast<float>(frame.anchor.x), static_cast<float>(frame.anchor.y),
               static_cast<float>(frame.anchor.z));
   glUniform1f(uniform("code_height"), static_cast<float>(frame.code_height));

@@ -13,8 +13,8 @@ namespace isohf::view {
 
 /// Fragment shaders for the terrain. `rim` is the variant for tiles with voids, or that reach beyond what the source
 /// covers: it discards voids and has clip distances.
-/// Light, colours, haze, and tile borders where wanted. A program for each mode.
-[[nodiscard]] std::string terrain_fragment_shader(bool rim, ColourMode mode, bool borders);
+/// Light, colours and haze. A program for each mode.
+[[nodiscard]] std::string terrain_fragment_shader(bool rim, ColourMode mode);
 /// (elevation code, normal x, normal z, 1): what verifying reads back.
 [[nodiscard]] std::string probe_fragment_shader(bool rim);
 /// (share of the sun, depth in the shadow, 0, 1): what verifying reads back of shadows.

@@ -60,7 +60,7 @@ ordered_json json_of(const Place& place) {
 
 Place probe(const TileSource& source, Ground& ground, WorldPoint at) {
   const WorldBounds covered = source.covered();
-  Place place = source.describe(at, ground.height(at, covered));
+  Place place = source.describe(at, ground.height(at));
   place.is_outside = at.x < covered.x0 || at.x > covered.x1 || at.z < covered.z0 || at.z > covered.z1;
   return place;
 }
@@ -80,7 +80,7 @@ Profile profile_between(const TileSource& source, Ground& ground, WorldPoint fro
   for (int i = 0; i < kProfilePoints; ++i) {
     const double share = i / (kProfilePoints - 1.0);
     const WorldPoint at{from.x + share * (to.x - from.x), from.z + share * (to.z - from.z)};
-    const auto height = ground.height(at, source.covered());
+    const auto height = ground.height(at);
     profile.heights.push_back(height ? *height / source.world_per_elevation()
                                      : std::numeric_limits<double>::quiet_NaN());
   }
