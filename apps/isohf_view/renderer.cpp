@@ -13,10 +13,9 @@ namespace {
 
 constexpr const char* kSkyVertex = R"glsl(#version 330 core
 out vec2 v_ndc;
-uniform float far_depth;
 void main() {
   v_ndc = vec2(float((gl_VertexID & 1) * 4 - 1), float((gl_VertexID & 2) * 2 - 1));
-  gl_Position = vec4(v_ndc, far_depth, 1.0);
+  gl_Position = vec4(v_ndc, 0.0, 1.0);
 }
 )glsl";
 
@@ -81,24 +80,16 @@ void set_light(const TerrainProgram& program, const ViewState& view, const Air& 
 }
 
 /// The least near distance, of the far distance.
-double least_near(DepthOrder order) {
-  return order == DepthOrder::kNearIsOne ? 1e-7 : 2e-4;
-}
-
-/// Units of polygon offset towards the eye.
-float offset_nearer(DepthOrder order, float units) {
-  return order == DepthOrder::kNearIsOne ? units : -units;
-}
+constexpr double kLeastNear = 1e-7;
 
 /// True where all corners of the box lie beyond one and the same plane of the clip volume.
-bool outside_view(const Mat4& clip, DepthOrder order, const TileVolume& box) {
+bool outside_view(const Mat4& clip, const TileVolume& box) {
   std::array<int, 5> beyond{};
   for (int corner = 0; corner < 8; ++corner) {
     const Vec3 at = box_corner(box.low, box.high, corner);
     const auto along = [&](int row) { return clip.along(row, at) + clip.at(row, 3); };
     const double w = along(3);
-    const std::array<bool, 5> is_beyond{along(0) < -w, along(0) > w, along(1) < -w, along(1) > w,
-                                        order == DepthOrder::kNearIsOne ? along(2) < 0.0 : along(2) > w};
+    const std::array<bool, 5> is_beyond{along(0) < -w, along(0) > w, along(1) < -w, along(1) > w, along(2) < 0.0};
     for (std::size_t plane = 0; plane < 5; ++plane) beyond[plane] += is_beyond[plane] ? 1 : 0;
   }
   return std::find(beyond.begin(), beyond.end(), 8) != beyond.end();
@@ -122,13 +113,13 @@ bool reaches_beyond(const TileGrid& grid, TileIndex tile, const WorldBounds& cov
 
 /// The frame's uniforms for a view: positions are relative to an anchor tile under the eye, in floats near the eye.
 /// nearest  distance from the eye within which nothing is drawn; a least share of the far distance if that is larger
-TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, double nearest, DepthOrder order) {
+TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, double nearest) {
   const TileGrid& grid = source.grid();
   const double aspect = static_cast<double>(view.width) / view.height;
   TerrainFrame frame;
-  const double near_distance = std::clamp(nearest, view.far_distance * least_near(order), 0.5 * view.far_distance);
-  const auto projection = order == DepthOrder::kNearIsOne ? perspective_reversed : perspective;
-  frame.clip_from_eye = projection(view.fov_y_rad, aspect, near_distance, view.far_distance) * look_along(view.forward);
+  const double near_distance = std::clamp(nearest, view.far_distance * kLeastNear, 0.5 * view.far_distance);
+  frame.clip_from_eye =
+      perspective(view.fov_y_rad, aspect, near_distance, view.far_distance) * look_along(view.forward);
   frame.anchor_tile = grid.locate({view.eye.x, view.eye.z}).tile;
   frame.anchor = {static_cast<double>(frame.anchor_tile.column) * grid.extent_x() - view.eye.x,
                   source.scale().offset * view.exaggeration - view.eye.y,
@@ -142,14 +133,9 @@ TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, doub
 
 }  // namespace
 
-DepthOrder best_depth_order() {
-  const bool can = epoxy_gl_version() >= 45 || epoxy_has_gl_extension("GL_ARB_clip_control");
-  return can ? DepthOrder::kNearIsOne : DepthOrder::kNearIsZero;
-}
-
-void begin_opaque_pass(DepthOrder order) {
+void begin_opaque_pass() {
   glEnable(GL_DEPTH_TEST);
-  glDepthFunc(order == DepthOrder::kNearIsOne ? GL_GREATER : GL_LESS);
+  glDepthFunc(GL_GREATER);
   glDepthMask(GL_TRUE);
   glDisable(GL_BLEND);
 }
@@ -168,8 +154,8 @@ void begin_fading_pass(bool write_depth) {
 // in and then switching to the coarse mesh at β = ½ is only seamless if the coarse mesh counts as in front there in
 // both stages: nearer by eight depth steps while it fades in over the fine one, and the fine one farther by eight while
 // it fades out over the coarse one.
-void order_fading(const LodBlend& blend, DepthOrder order) {
-  glPolygonOffset(0.0F, offset_nearer(order, blend.second > blend.first ? 8.0F : -8.0F));
+void order_fading(const LodBlend& blend) {
+  glPolygonOffset(0.0F, blend.second > blend.first ? 8.0F : -8.0F);
 }
 
 void end_fading_pass() {
@@ -248,7 +234,7 @@ void Renderer::find_visible(Frame& frame, const TileRange& top, const ResidentTi
     const TileGrid& grid = planes_.grid(at.plane);
     const TileBounds bounds = bounds_of(at);
     const TileVolume box = tile_volume(grid, at.tile, bounds, view);
-    if (outside_view(frame.terrain.clip_from_eye, order_, box)) continue;
+    if (outside_view(frame.terrain.clip_from_eye, box)) continue;
     const TileSlot* slot = resident(at);
     if (slot == nullptr) {
       ++frame.figures.absent_tiles;
@@ -340,7 +326,7 @@ void Renderer::draw_mesh(Frame& frame, const TerrainProgram& program, const Item
 }
 
 void Renderer::draw_opaque(Frame& frame) {
-  begin_opaque_pass(order_);
+  begin_opaque_pass();
   for (const bool rim : {false, true}) {
     const TerrainProgram& program = shading(frame.view, rim);
     begin_shading(frame, program);
@@ -360,7 +346,7 @@ void Renderer::draw_fading(Frame& frame) {
     begin_shading(frame, program);
     for (auto item = frame.items.rbegin(); item != frame.items.rend(); ++item) {
       if (item->is_rim != rim || !fades(*item)) continue;
-      order_fading(item->blend, order_);
+      order_fading(item->blend);
       glUniform1f(program.uniform("alpha"), static_cast<float>(item->blend.alpha));
       draw_mesh(frame, program, *item, item->blend.second);
     }
@@ -371,7 +357,7 @@ void Renderer::draw_fading(Frame& frame) {
 void Renderer::draw_wires(Frame& frame) const {
   glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
   glEnable(GL_POLYGON_OFFSET_LINE);
-  glPolygonOffset(offset_nearer(order_, 1.0F), offset_nearer(order_, 2.0F));
+  glPolygonOffset(1.0F, 2.0F);
   glEnable(GL_BLEND);
   glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
   for (const bool rim : {false, true}) {
@@ -408,19 +394,17 @@ void Renderer::draw_sky(const ViewState& view) const {
   set_vec3(sky_.uniform("horizon"), by_day(air_.horizon, sun));
   set_vec3(sky_.uniform("zenith"), by_day(air_.zenith, sun));
   // At the far end of depth: only where no ground is.
-  const bool reversed = order_ == DepthOrder::kNearIsOne;
-  glUniform1f(sky_.uniform("far_depth"), reversed ? 0.0F : 1.0F);
-  glDepthFunc(reversed ? GL_GEQUAL : GL_LEQUAL);
+  glDepthFunc(GL_GEQUAL);
   glDepthMask(GL_FALSE);
   glBindVertexArray(nothing_.get());
   glDrawArrays(GL_TRIANGLES, 0, 3);
   glDepthMask(GL_TRUE);
-  glDepthFunc(reversed ? GL_GREATER : GL_LESS);
+  glDepthFunc(GL_GREATER);
 }
 
 FrameFigures Renderer::draw(const ViewState& view, const TileRange& top, const ResidentTile& resident) {
   drawn_.clear();
-  Frame frame{view, terrain_frame(source_, view, 0.0, order_), {}, {}};
+  Frame frame{view, terrain_frame(source_, view, 0.0), {}, {}};
   find_visible(frame, top, resident);
   // Depth is fine only near the eye: begin it where the ground begins, or two meshes of one hill cannot be told apart.
   double nearest = view.far_distance;
@@ -429,10 +413,9 @@ FrameFigures Renderer::draw(const ViewState& view, const TileRange& top, const R
   const double half_y = std::tan(view.fov_y_rad / 2.0);
   const double half_x = half_y * view.width / view.height;
   nearest *= 0.95 / std::sqrt(1.0 + half_x * half_x + half_y * half_y);
-  frame.terrain = terrain_frame(source_, view, nearest, order_);
-  const bool reversed = order_ == DepthOrder::kNearIsOne;
-  if (reversed) glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
-  glClearDepth(reversed ? 0.0 : 1.0);
+  frame.terrain = terrain_frame(source_, view, nearest);
+  glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+  glClearDepth(0.0);
   glViewport(0, 0, view.width, view.height);
   glDepthMask(GL_TRUE);
   glFrontFace(GL_CCW);
@@ -451,8 +434,6 @@ FrameFigures Renderer::draw(const ViewState& view, const TileRange& top, const R
     ++frame.figures.passes;
   }
   glBindVertexArray(0);
-  glClearDepth(1.0);
-  if (reversed) glClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
   return frame.figures;
 }
 

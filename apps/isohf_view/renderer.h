@@ -15,13 +15,6 @@
 
 namespace isohf::view {
 
-/// How depth runs: from 0 near to 1 far, as GL has it; or from 1 near to 0 far, which with floats is fine at any
-/// distance and lets the near plane stand at the eye.
-enum class DepthOrder { kNearIsZero, kNearIsOne };
-
-/// kNearIsOne where the driver can (GL_ARB_clip_control, OpenGL 4.5).
-[[nodiscard]] DepthOrder best_depth_order();
-
 /// What light comes from beside the sun: linear colours of the sky, and of what it lends level ground.
 struct Air {
   Vec3 horizon;
@@ -107,7 +100,6 @@ class Renderer {
   Planes planes_;
   TileBounds whole_;
   Air air_;
-  DepthOrder order_ = best_depth_order();
   std::map<std::pair<ColourMode, bool>, TerrainProgram> shading_;  ///< by mode, rim
   std::vector<PlaneTile> drawn_;
   TerrainPrograms flat_;
@@ -118,11 +110,11 @@ class Renderer {
   VertexArray nothing_;
 };
 
-/// The GL state of the opaque and of the fading pass; verifying draws with the same.
-void begin_opaque_pass(DepthOrder order = DepthOrder::kNearIsZero);
+/// The GL state of the opaque and of the fading pass; verifying draws with the same. Depth runs from 1 near to 0 far.
+void begin_opaque_pass();
 void begin_fading_pass(bool write_depth = true);
 /// Before a tile's second mesh is drawn in the fading pass.
-void order_fading(const LodBlend& blend, DepthOrder order = DepthOrder::kNearIsZero);
+void order_fading(const LodBlend& blend);
 void end_fading_pass();
 
 }  // namespace isohf::view

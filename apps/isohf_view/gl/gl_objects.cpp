@@ -66,9 +66,13 @@ GLint Program::uniform(const char* uniform_name) const {
 
 void require_gl() {
   const int version = epoxy_gl_version();
-  if (version >= 33 && epoxy_is_desktop_gl()) return;
-  throw Error(ErrorCode::kUnsupported,
-              fmt::format("OpenGL 3.3 is required, this machine offers {}.{}", version / 10, version % 10));
+  if (version < 33 || !epoxy_is_desktop_gl()) {
+    throw Error(ErrorCode::kUnsupported,
+                fmt::format("OpenGL 3.3 is required, this machine offers {}.{}", version / 10, version % 10));
+  }
+  if (version < 45 && !epoxy_has_gl_extension("GL_ARB_clip_control")) {
+    throw Error(ErrorCode::kUnsupported, "this machine's OpenGL has no GL_ARB_clip_control, which is required");
+  }
 }
 
 void check_gl(const char* doing) {

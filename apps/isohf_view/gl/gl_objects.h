@@ -64,7 +64,7 @@ class Program {
   mutable std::map<std::string, GLint, std::less<>> places_;
 };
 
-/// Throws Error{kUnsupported} in one line unless the current context is OpenGL 3.3 or newer.
+/// Throws Error{kUnsupported} in one line unless the current context is OpenGL 3.3 or newer and has GL_ARB_clip_control.
 void require_gl();
 
 /// Throws Error{kOutOfMemory, kUnsupported} where GL has an error to report; `doing` says what was tried.

@@ -71,24 +71,16 @@ inline Mat4 operator*(const Mat4& a, const Mat4& b) {
   return out;
 }
 
-/// Perspective projection to clip space: vertical field of view, width/height, near and far distance.
+/// Perspective projection to clip space: vertical field of view, width/height, near and far distance. Depth runs from 1
+/// at the near to 0 at the far distance (glClipControl, GL_ZERO_TO_ONE), which floats hold as finely far away as near.
 inline Mat4 perspective(double fov_y_rad, double aspect, double near_distance, double far_distance) {
   const double focal = 1.0 / std::tan(fov_y_rad / 2.0);
   Mat4 out;
   out.at(0, 0) = focal / aspect;
   out.at(1, 1) = focal;
-  out.at(2, 2) = (far_distance + near_distance) / (near_distance - far_distance);
-  out.at(2, 3) = 2.0 * far_distance * near_distance / (near_distance - far_distance);
-  out.at(3, 2) = -1.0;
-  return out;
-}
-
-/// The same for depth from 1 at the near to 0 at the far distance (glClipControl, GL_ZERO_TO_ONE), which floats hold as
-/// finely far away as near.
-inline Mat4 perspective_reversed(double fov_y_rad, double aspect, double near_distance, double far_distance) {
-  Mat4 out = perspective(fov_y_rad, aspect, near_distance, far_distance);
   out.at(2, 2) = near_distance / (far_distance - near_distance);
   out.at(2, 3) = far_distance * near_distance / (far_distance - near_distance);
+  out.at(3, 2) = -1.0;
   return out;
 }
 

@@ -34,14 +34,15 @@ void TileProbe::begin(const TerrainProgram& program, const PixelWindow& window) 
   clip.at(0, 3) = -2.0 * window.x0 / target_.width() - 1.0;
   clip.at(1, 2) = -2.0 * kPixelsPerZ / (grid_.sigma_z() * target_.height());
   clip.at(1, 3) = 2.0 * (window.z0 + window.height) / target_.height() - 1.0;
-  clip.at(2, 1) = -1.8 / (65535.0 * frame_.code_height);
-  clip.at(2, 3) = 0.9;
+  clip.at(2, 1) = 0.9 / (65535.0 * frame_.code_height);
+  clip.at(2, 3) = 0.05;
   clip.at(3, 3) = 1.0;
   frame_.clip_from_eye = clip;
   target_.bind();
   glViewport(0, 0, target_.width(), target_.height());
   glClearColor(0.0F, 0.0F, 0.0F, 0.0F);
   glDepthMask(GL_TRUE);
+  glClearDepth(0.0);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   glFrontFace(GL_CCW);
   glCullFace(GL_BACK);
