@@ -20,7 +20,6 @@
 #include "output/progress.h"
 #include "output/standard_output.h"
 #include "program.h"
-#include "reading/place.h"
 #include "session.h"
 #include "verify/verify_view.h"
 
@@ -135,40 +134,6 @@ int verify(const TileSource& source, const Options& options) {
   return report.passed() ? cli::kExitDone : cli::kExitDifferences;
 }
 
-int say_place(const TileSource& source, const Options& options) {
-  Ground ground(source);
-  std::vector<Place> places;
-  for (std::size_t i = 0; i < options.probe.size(); i += 2) {
-    places.push_back(probe(source, ground, source.from_archive({options.probe[i], options.probe[i + 1]})));
-  }
-  std::optional<Profile> profile;
-  if (places.size() > 1) {
-    profile = profile_between(source, ground, source.from_archive(places[0].at), source.from_archive(places[1].at));
-  }
-  std::string text;
-  for (const Place& place : places) text += fmt::format("{}\n", fmt::join(lines_of(place), "\n"));
-  if (profile) {
-    text += describe_length(profile->length, source.ground_unit()) + " from the first to the second";
-    std::vector<double> heights = profile->heights;
-    std::erase_if(heights, [](double height) { return std::isnan(height); });
-    if (!heights.empty()) {
-      const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
-      text += fmt::format(", over elevations from {:.6g} to {:.6g} {}", *low, *high, short_unit(source.height_unit()));
-      if (text.back() == ' ') text.pop_back();
-    }
-    text += "\n";
-  }
-  cli::CommonOptions answers = options.common;
-  answers.quiet = false;  // what is asked for is said
-  print_result(answers, text, [&] {
-    ordered_json json{{"archive", options.archive}, {"places", ordered_json::array()}};
-    for (const Place& place : places) json["places"].push_back(json_of(place));
-    if (profile) json["profile"] = json_of(*profile);
-    return json;
-  });
-  return cli::kExitDone;
-}
-
 int run(const cli::Arguments& arguments) {
   if (const char* folder = std::getenv("ISOHF_MODULE_PATH"); folder != nullptr) set_module_folder(folder);
   const std::optional<Options> options = parse_options(arguments);
@@ -183,7 +148,6 @@ int run(const cli::Arguments& arguments) {
     return cli::kExitDone;
   }
   const std::unique_ptr<TileSource> source = open_shown(*options);
-  if (options->action == Options::Action::kProbe) return say_place(*source, *options);
   const HeadlessContext context;
   require_gl();
   return options->action == Options::Action::kScreenshot ? take_screenshot(*source, *options)

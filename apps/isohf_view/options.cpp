@@ -17,7 +17,7 @@ namespace {
 using cli::CommandLine;
 
 constexpr const char* kFooter =
-    R"(Without --screenshot, --verify or --probe a window opens; H shows its keys.
+    R"(Without --screenshot or --verify a window opens; H shows its keys.
 
 Positions are world units of the archive from its North-West corner: x eastwards, y up, z southwards. An archive laid out
 in degrees is drawn in metres, but for x and z, which stay degrees.
@@ -36,7 +36,6 @@ Examples:
   isohf view dem.isohf
   isohf view dem.isohf --screenshot view.png --sun 110,20 --exaggeration 1.5
   isohf view dem.isohf --date 2026-12-21 --time 15:30
-  isohf view dem.isohf --probe 12000,8000 --json
   isohf view dem.isohf --verify)";
 
 /// Below that what is written lies on itself.
@@ -83,19 +82,9 @@ void add_actions(CommandLine& line, Options& options, bool& window, bool& verify
   line.option("--tiles", "A:B,C:D",
               "Verify columns A to B-1 and rows C to D-1 of tiles alone, from 0 in the North-West",
               [&](const std::string& text) { options.tiles = cli::parse_tile_range(text); });
-  line.option("--probe", "X,Z[,X,Z]",
-              "Say what is known of a place, in world units; of two also the heights between them",
-              [&](const std::string& text) {
-                options.probe = cli::parse_numbers(text);
-                const auto is_place = [](double number) { return std::isfinite(number); };
-                if ((options.probe.size() != 2 && options.probe.size() != 4) ||
-                    !std::all_of(options.probe.begin(), options.probe.end(), is_place)) {
-                  refuse(text, "X,Z or X,Z,X,Z");
-                }
-              });
   line.flag("--window", "Open a window even with --screenshot, which then shows the window", window);
-  line.exclusive({"--screenshot", "--verify", "--probe"});
-  line.exclusive({"--window", "--verify", "--probe"});
+  line.exclusive({"--screenshot", "--verify"});
+  line.exclusive({"--window", "--verify"});
   line.option("--frames", "N", "Close the window after N frames", [&](const std::string& text) {
     options.frames = static_cast<int>(cli::parse_whole_number(text, 1, 10000000));
   });
@@ -230,7 +219,6 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   if (options.position && options.look_at && *options.position == *options.look_at) {
     line.fail("--look-at is the place of --position, which gives no direction; name another place");
   }
-  if (!options.probe.empty()) options.action = Options::Action::kProbe;
   options.overlay = !no_overlay;
   if (!options.screenshot.empty() && !window) options.action = Options::Action::kScreenshot;
   if (verify) options.action = Options::Action::kVerify;

@@ -14,7 +14,7 @@ namespace isohf::view {
 
 /// What the command line asks for; no file has been touched.
 struct Options {
-  enum class Action { kWindow, kScreenshot, kVerify, kProbe };
+  enum class Action { kWindow, kScreenshot, kVerify };
 
   Action action = Action::kWindow;
   cli::CommonOptions common;
@@ -30,7 +30,6 @@ struct Options {
   std::optional<ShadePalette> palette;
   std::string palette_file;
   std::optional<isohf::TileRange> tiles;  ///< that --verify looks at
-  std::vector<double> probe;              ///< x, z of a place, or of two
   double sun_azimuth_deg = 300.0;
   double sun_elevation_deg = 35.0;
   std::optional<double> exaggeration;  ///< nullopt: default_exaggeration()

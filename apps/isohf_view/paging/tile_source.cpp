@@ -104,7 +104,7 @@ class ArchiveSource final : public TileSource {
   };
 
  public:
-  [[nodiscard]] Place describe(WorldPoint at, std::optional<double> height) const override {
+  [[nodiscard]] Place describe(WorldPoint at, double height) const override {
     Place place = TileSource::describe(at, height);
     place.unit = height_unit();
     std::call_once(georeference_once_, [this] { georeference_ = understood_places(reader_); });
@@ -195,10 +195,10 @@ void TileSource::read_heights(TileIndex tile, std::span<float> heights) const {
   });
 }
 
-Place TileSource::describe(WorldPoint at, std::optional<double> height) const {
+Place TileSource::describe(WorldPoint at, double height) const {
   Place place;
   place.at = to_archive(at);
-  if (height) place.elevation = *height / world_per_elevation();
+  place.elevation = height / world_per_elevation();
   place.decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(scale().scale / world_per_elevation()))), 0, 6);
   return place;
 }

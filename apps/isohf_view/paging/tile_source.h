@@ -41,13 +41,12 @@ struct TileBounds {
 
 /// The names of a place.
 struct Place {
-  WorldPoint at{};                  ///< in the archive's world
-  std::optional<double> elevation;  ///< in `unit`
-  std::string unit;                 ///< empty where it is not known
-  int decimals = 0;                 ///< of the elevation: as many as codes have steps
-  std::optional<MapPoint> map;      ///< in the source's system, where that is a map
+  WorldPoint at{};              ///< in the archive's world
+  double elevation = 0.0;       ///< in `unit`
+  std::string unit;             ///< empty where it is not known
+  int decimals = 0;             ///< of the elevation: as many as codes have steps
+  std::optional<MapPoint> map;  ///< in the source's system, where that is a map
   std::optional<GeoPoint> geo;
-  bool is_outside = false;  ///< of what the source covers; without an elevation inside it is void
 };
 
 /// Where tiles come from. All functions may be called from any number of threads at once.
@@ -78,8 +77,8 @@ class TileSource {
   [[nodiscard]] virtual GroundScale ground_scale() const { return {}; }
   [[nodiscard]] WorldPoint from_archive(WorldPoint at) const;
   [[nodiscard]] WorldPoint to_archive(WorldPoint at) const;
-  /// All names of a place whose height is known, world units.
-  [[nodiscard]] virtual Place describe(WorldPoint at, std::optional<double> height) const;
+  /// All names of a place of that height, world units.
+  [[nodiscard]] virtual Place describe(WorldPoint at, double height) const;
   /// World units of one elevation unit; 1 where either is not known.
   [[nodiscard]] virtual double world_per_elevation() const { return 1.0; }
   /// nullptr where there is no archive.

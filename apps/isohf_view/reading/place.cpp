@@ -32,11 +32,7 @@ std::string plain(double value) {
 std::vector<std::string> lines_of(const Place& place) {
   std::vector<std::string> lines{"x " + plain(place.at.x) + "  z " + plain(place.at.z)};
   const std::string unit = place.unit.empty() ? "" : " " + short_unit(place.unit);
-  if (place.elevation) {
-    lines.back() +=
-        fmt::format("  elevation {:.{}f}{}", rounded(*place.elevation, place.decimals), place.decimals, unit);
-  }
-  if (!place.elevation) lines.back() += place.is_outside ? "  outside" : "  void";
+  lines.back() += fmt::format("  elevation {:.{}f}{}", rounded(place.elevation, place.decimals), place.decimals, unit);
   if (place.map) lines.push_back(fmt::format("E {:.2f}  N {:.2f}", place.map->easting, place.map->northing));
   if (place.geo) {
     const double east = place.geo->longitude;
@@ -48,26 +44,17 @@ std::vector<std::string> lines_of(const Place& place) {
 }
 
 ordered_json json_of(const Place& place) {
-  ordered_json json{{"x", place.at.x}, {"z", place.at.z}, {"elevation", nullptr}};
-  if (place.elevation) json["elevation"] = *place.elevation;
+  ordered_json json{{"x", place.at.x}, {"z", place.at.z}, {"elevation", place.elevation}};
   json["unit"] = place.unit.empty() ? ordered_json(nullptr) : ordered_json(place.unit);
   if (place.map) json["map"] = {place.map->easting, place.map->northing};
   if (place.geo) json["longitude"] = place.geo->longitude;
   if (place.geo) json["latitude"] = place.geo->latitude;
-  json["state"] = place.elevation ? "ground" : place.is_outside ? "outside" : "void";
   return json;
 }
 
-Place probe(const TileSource& source, Ground& ground, WorldPoint at) {
-  const WorldBounds covered = source.covered();
-  Place place = source.describe(at, ground.height(at));
-  place.is_outside = at.x < covered.x0 || at.x > covered.x1 || at.z < covered.z0 || at.z > covered.z1;
-  return place;
-}
-
 double distance_between(const TileSource& source, WorldPoint from, WorldPoint to) {
-  const Place first = source.describe(from, std::nullopt);
-  const Place second = source.describe(to, std::nullopt);
+  const Place first = source.describe(from, 0.0);
+  const Place second = source.describe(to, 0.0);
   const bool is_known = source.metadata() != nullptr && source.ground_unit() == "metre" && first.geo && second.geo &&
                         !std::isnan(first.geo->latitude + second.geo->latitude);
   return is_known ? ground_distance_m(*source.metadata(), *first.geo, *second.geo)
@@ -85,14 +72,6 @@ Profile profile_between(const TileSource& source, Ground& ground, WorldPoint fro
                                      : std::numeric_limits<double>::quiet_NaN());
   }
   return profile;
-}
-
-ordered_json json_of(const Profile& profile) {
-  ordered_json heights = ordered_json::array();
-  for (const double height : profile.heights) {
-    heights.push_back(std::isnan(height) ? ordered_json(nullptr) : ordered_json(height));
-  }
-  return {{"length", profile.length}, {"heights", heights}};
 }
 
 }  // namespace isohf::view

@@ -14,14 +14,10 @@ namespace isohf::view {
 [[nodiscard]] std::vector<std::string> lines_of(const Place& place);
 [[nodiscard]] nlohmann::ordered_json json_of(const Place& place);
 
-/// The place and its elevation by the triangles of full detail.
-[[nodiscard]] Place probe(const TileSource& source, Ground& ground, WorldPoint at);
-
 /// How far apart two places are: metres along the body where longitudes and latitudes are known, else world units.
 [[nodiscard]] double distance_between(const TileSource& source, WorldPoint from, WorldPoint to);
 
 /// Heights between two places, of full detail, at as many points as a screen is wide.
 [[nodiscard]] Profile profile_between(const TileSource& source, Ground& ground, WorldPoint from, WorldPoint to);
-[[nodiscard]] nlohmann::ordered_json json_of(const Profile& profile);
 
 }  // namespace isohf::view
