@@ -38,7 +38,7 @@ std::function<void()> interrupt_check() {
 int take_screenshot(const TileSource& source, const Options& options) {
   Session session(source, options);
   session.poll = interrupt_check();
-  const Offscreen target(options.view.width, options.view.height, GL_RGBA8, options.samples.value_or(kPictureSamples));
+  const Offscreen target(options.view.width, options.view.height, GL_RGBA8, kPictureSamples);
   session.complete_frame();
   glFinish();
   session.poll();

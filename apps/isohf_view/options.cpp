@@ -141,12 +141,6 @@ void add_picture(CommandLine& line, Options& options) {
       "Draw heights F times as high (default 1; more where the ground would look flat, less where its unit is not "
       "known and heights would tower over it)",
       [&](const std::string& text) { options.exaggeration = cli::parse_positive_number(text); });
-  line.option("--samples", "N",
-              "Draw pixels as means of 1, 2, 4 or 8 samples (default 4; 1 of what moves in a window that no GPU draws)",
-              [&](const std::string& text) {
-                constexpr int kSamples[] = {1, 2, 4, 8};
-                options.samples = kSamples[cli::parse_word(text, {"1", "2", "4", "8"})];
-              });
   line.option(
       "--mode", "NAME",
       "Colour by elevation, levels, strips, texture or normals (default: texture where the archive has "

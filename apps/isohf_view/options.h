@@ -37,7 +37,6 @@ struct Options {
   bool shadows = true;
   std::optional<double> shadow_softness;  ///< k of Eq. 16, world units; nullopt: the sun's disc
   std::optional<double> far_distance;
-  std::optional<int> samples;  ///< a pixel; nullopt: 4, but 1 in a window that software draws
   std::uint64_t memory_mib = 512;
   std::uint64_t upload_mib = 4;
   int threads = 0;  ///< workers that decode; 0: one less than the machine's cores

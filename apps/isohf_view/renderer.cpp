@@ -218,7 +218,7 @@ double Renderer::level_of(const ViewState& view, PlaneTile at) const {
   const TileVolume box = tile_volume(grid, at.tile, source_.plane(at.plane).bounds(at.tile), view);
   const double distance = at.plane == 0 ? length(0.5 * (box.low + box.high)) : box.distance();
   return fractional_level(projected_area_px(triangle_area(source_.grid(), 1.0), view.focal_px(), distance), levels,
-                          view.triangle_px * view.coarser);
+                          view.triangle_px);
 }
 
 void Renderer::find_visible(Frame& frame, const TileRange& top, const ResidentTile& resident) const {

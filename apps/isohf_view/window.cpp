@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -359,9 +358,6 @@ std::string next_picture_name() {
 
 }  // namespace
 
-/// Frames that take longer do not feel as if the ground were in the hand.
-constexpr double kSlow_s = 1.0 / 12.0;
-
 void run_window(const Options& options) {
   const std::unique_ptr<TileSource> source = open_shown(options);
   const Window window(options.view.width, options.view.height, fmt::format("isohf-view - {}", options.archive));
@@ -369,17 +365,10 @@ void run_window(const Options& options) {
   Session session(*source, options);
   Controls controls(window.get(), session);
   if (!options.overlay) controls.show_figures = Session::Figures::kNone;
-  // What stands still is drawn with more samples than a moving picture where that takes its time.
-  const std::array<int, 2> samples{options.samples.value_or(is_software_driver() ? 1 : kPictureSamples),
-                                   options.samples.value_or(kPictureSamples)};
-  std::array<std::optional<Offscreen>, 2> targets;
-  const Offscreen* picture = nullptr;  // the last one
-  bool is_final = false;               // it is what an eye that stands still sees
+  std::optional<Offscreen> picture;  // the last one
   using Clock = std::chrono::steady_clock;
   auto last = Clock::now();
   double smooth_s = 1.0 / 60.0;
-  double drawing_s = 0.0;  // the last frame that moved
-  double coarser = 1.0;
   const std::atomic<bool>& interrupted = cli::watch_interrupts();
   std::int64_t drawn = 0;
   for (int frame = 1; glfwWindowShouldClose(window.get()) == GLFW_FALSE; ++frame) {
@@ -395,8 +384,8 @@ void run_window(const Options& options) {
     glfwGetFramebufferSize(window.get(), &width, &height);
     const bool iconified = width < 1 || height < 1;
     // Where nothing moves and nothing is to come the picture stays; an event wakes us.
-    const bool stays = picture != nullptr && picture->width() == width && picture->height() == height && !moves &&
-                       is_final && options.frames == 0 && session.is_settled();
+    const bool fits = picture && picture->width() == width && picture->height() == height;
+    const bool stays = fits && !moves && options.frames == 0 && session.is_settled();
     if (iconified || (stays && change == Controls::Change::kNone)) {
       glfwWaitEventsTimeout(kIdle_s);
       last = Clock::now();
@@ -405,24 +394,11 @@ void run_window(const Options& options) {
     }
     smooth_s += 0.1 * (seconds - smooth_s);
     if (!stays) {
-      // What is drawn slowly is drawn coarser while it moves, and in full as soon as it stands still or is kept.
-      if (moves && options.frames == 0) {
-        coarser = std::clamp(coarser * (drawing_s > kSlow_s ? 1.5 : drawing_s < 0.4 * kSlow_s ? 0.8 : 1.0), 1.0, 64.0);
-      }
-      const bool in_full = !moves || controls.wants_picture;
-      is_final = !moves && session.is_settled();
-      session.view.coarser = in_full ? 1.0 : coarser;
       session.view.width = width;
       session.view.height = height;
-      const std::size_t which = samples[0] != samples[1] && (is_final || controls.wants_picture) ? 1 : 0;
-      std::optional<Offscreen>& target = targets[which];
-      if (!target || target->width() != width || target->height() != height) {
-        target.emplace(width, height, GL_RGBA8, samples[which]);
-      }
-      picture = &*target;
+      if (!fits) picture.emplace(width, height, GL_RGBA8, kPictureSamples);
       picture->bind();
       session.frame();
-      is_final = is_final && session.is_settled();
       ++drawn;
     }
     const bool is_last = options.frames > 0 && frame >= options.frames;
@@ -445,7 +421,6 @@ void run_window(const Options& options) {
       write_picture(options.screenshot, width, height, options.overwrite);
     }
     glfwSwapBuffers(window.get());
-    if (moves) drawing_s = std::chrono::duration<double>(Clock::now() - now).count();
     if (is_last) break;
   }
   if (!options.common.json) return;

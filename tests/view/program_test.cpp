@@ -500,7 +500,7 @@ TEST_F(ViewProgramTest, EndsWith130WhereItIsInterrupted) {
   test::write_analytic_archive(path("many.isohf"), TileGrid::make(TileShape::make(36, 43, 3), 40, 30, 320.0, 320.0));
   const std::pair<const char*, const char*> kCases[] = {
       {"INT", "--verify"},
-      {"TERM", "--screenshot big.png --size 4096x4096 --samples 8"},
+      {"TERM", "--screenshot big.png --size 8192x8192"},
   };
   for (const std::string& what :
        {path("many.isohf"), std::string(ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif")}) {

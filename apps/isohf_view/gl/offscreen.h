@@ -25,7 +25,7 @@ class HeadlessContext {
   std::unique_ptr<State> state_;
 };
 
-/// Samples a pixel of pictures, unless the user says.
+/// Samples a pixel, of pictures and windows.
 constexpr int kPictureSamples = 4;
 
 /// The name that the driver gives itself.
