@@ -44,7 +44,6 @@ _isohf() {
     'experiment --fit') values='least-squares interpolate' ;;
     *' --texture-format') values='png jpeg' ;;
     'view --mode') values='elevation levels strips texture normals' ;;
-    'view --shadows') values='on off' ;;
   esac
   if [[ -n $values ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$values" -- "$current")

@@ -8,8 +8,8 @@
 
 namespace isohf::view {
 
-/// Opens the archive and a window and lets a person fly until it is closed, or for options.frames frames; writes
-/// options.screenshot of the last frame where asked, and with --json says where the eye stood at the end. Throws Error{kUnsupported} where no window or no OpenGL 3.3 can be had.
+/// Opens the archive and a window and lets a person fly until it is closed; with --json prints the last view. Throws
+/// Error{kUnsupported} if no window or no OpenGL 3.3 can be had.
 void run_window(const Options& options);
 
 /// Prints an action's result as --json and --quiet ask for; `json` makes the document where it is wanted.

@@ -72,7 +72,7 @@ std::uint64_t parse_mebibytes(const std::string& text) {
   return bytes >> 20;
 }
 
-void add_actions(CommandLine& line, Options& options, bool& window, bool& verify) {
+void add_actions(CommandLine& line, Options& options, bool& verify) {
   line.group("Actions");
   line.option("--screenshot", "FILE.png", "Write a picture and end", [&](const std::string& text) {
     if (!text.ends_with(".png")) refuse(text, "a file name that ends with .png");
@@ -82,12 +82,7 @@ void add_actions(CommandLine& line, Options& options, bool& window, bool& verify
   line.option("--tiles", "A:B,C:D",
               "Verify columns A to B-1 and rows C to D-1 of tiles alone, from 0 in the North-West",
               [&](const std::string& text) { options.tiles = cli::parse_tile_range(text); });
-  line.flag("--window", "Open a window even with --screenshot, which then shows the window", window);
   line.exclusive({"--screenshot", "--verify"});
-  line.exclusive({"--window", "--verify"});
-  line.option("--frames", "N", "Close the window after N frames", [&](const std::string& text) {
-    options.frames = static_cast<int>(cli::parse_whole_number(text, 1, 10000000));
-  });
   line.flag("--overwrite", "Replace files that exist", options.overwrite);
 }
 
@@ -111,13 +106,6 @@ void add_light(CommandLine& line, Options& options, std::optional<double>& time)
   line.option("--time", "HH:MM", "With --date: mean solar time there (default 12:00)",
               [&time](const std::string& text) { time = cli::parse_time(text); });
   line.exclusive({"--date", "--sun"});
-  line.option("--shadows", "on|off", "Draw cast shadows (default: on)", [&](const std::string& text) {
-    options.shadows = cli::parse_word(text, {"on", "off"}) == 0;
-  });
-  line.option("--shadow-softness", "K",
-              "One size of all penumbrae, world units of height (default: the sun's disc, whose penumbra grows with "
-              "the caster's distance)",
-              [&](const std::string& text) { options.shadow_softness = cli::parse_positive_number(text); });
 }
 
 void add_picture(CommandLine& line, Options& options) {
@@ -175,17 +163,14 @@ void add_picture(CommandLine& line, Options& options) {
 
 std::optional<Options> parse_options(const cli::Arguments& arguments) {
   Options options;
-  bool window = false;
   bool verify = false;
-  bool no_overlay = false;
   std::optional<double> time;
   CommandLine line("view", "Views an archive of an isometric heightfield, or draws and checks it without a screen.");
   line.group("Arguments");
   line.positional("ARCHIVE", "-i,--input",
                   "Archive to view, or a raster: it is converted for as long as it is looked at", options.archive);
-  add_actions(line, options, window, verify);
+  add_actions(line, options, verify);
   add_picture(line, options);
-  line.flag("--no-overlay", "Leave out what a window writes over the picture", no_overlay);
   line.flag("--legend", "Write scale bar, North arrow and the colours' legend on pictures", options.legend);
   add_light(line, options, time);
   line.group("Work");
@@ -194,8 +179,6 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
       [&](const std::string& text) { options.threads = static_cast<int>(cli::parse_whole_number(text, 1, 256)); });
   line.option("--memory", "SIZE", "Hold tiles and textures in SIZE of memory (default 512M); as in 400M or 1.5GiB",
               [&](const std::string& text) { options.memory_mib = parse_mebibytes(text); });
-  line.option("--upload", "SIZE", "Send at most SIZE to the GPU in one frame (default 4M)",
-              [&](const std::string& text) { options.upload_mib = parse_mebibytes(text); });
   cli::add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
@@ -203,7 +186,7 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   const auto needs = [&](const char* option, bool is_met, const char* needed) {
     if (line.given(option) && !is_met) line.fail(std::string(option) + " needs " + needed);
   };
-  needs("--legend", !options.screenshot.empty() && !window, "--screenshot without --window");
+  needs("--legend", !options.screenshot.empty(), "--screenshot");
   if (options.legend && (options.view.width < kLegend_px.width || options.view.height < kLegend_px.height)) {
     line.fail(fmt::format("--legend needs pictures of at least {}x{} (--size)", kLegend_px.width, kLegend_px.height));
   }
@@ -213,10 +196,8 @@ std::optional<Options> parse_options(const cli::Arguments& arguments) {
   if (options.position && options.look_at && *options.position == *options.look_at) {
     line.fail("--look-at is the place of --position, which gives no direction; name another place");
   }
-  options.overlay = !no_overlay;
-  if (!options.screenshot.empty() && !window) options.action = Options::Action::kScreenshot;
+  if (!options.screenshot.empty()) options.action = Options::Action::kScreenshot;
   if (verify) options.action = Options::Action::kVerify;
-  needs("--frames", options.action == Options::Action::kWindow, "a window");
   return options;
 }
 

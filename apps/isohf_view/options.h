@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "isohf/parts.h"
 #include "isohf/shade.h"
@@ -19,10 +18,8 @@ struct Options {
   Action action = Action::kWindow;
   cli::CommonOptions common;
   std::string archive;
-  std::string screenshot;  ///< PNG to write; with kWindow: of the window, after `frames` frames
-  int frames = 0;          ///< 0: until the window is closed
+  std::string screenshot;  ///< PNG to write
   bool overwrite = false;
-  bool overlay = true;           ///< figures on the screen
   bool legend = false;           ///< on pictures
   std::optional<Vec3> position;  ///< world units, y before exaggeration
   std::optional<Vec3> look_at;
@@ -34,11 +31,8 @@ struct Options {
   double sun_elevation_deg = 35.0;
   std::optional<double> exaggeration;  ///< nullopt: default_exaggeration()
   bool mode_given = false;             ///< else textures are shown where the archive has them
-  bool shadows = true;
-  std::optional<double> shadow_softness;  ///< k of Eq. 16, world units; nullopt: the sun's disc
   std::optional<double> far_distance;
   std::uint64_t memory_mib = 512;
-  std::uint64_t upload_mib = 4;
   int threads = 0;  ///< workers that decode; 0: one less than the machine's cores
   ViewState view;   ///< size, mode, level, field of view, switches
 };

@@ -24,13 +24,16 @@ std::uint64_t texture_bytes(const TileSource& source, const Options& options) {
 
 constexpr double kFromAbove_rad = -1.4;
 
+/// Most that a frame sends to the GPU, tiles and textures together.
+constexpr std::uint64_t kUploadBytes = std::uint64_t{4} << 20;
+
 /// Four in each plane's box, and what is on its way.
 constexpr std::uint64_t kTilesAtLeast = 6;
 
 TileBoxLimits limits_from(const TileSource& source, const Options& options) {
   TileBoxLimits limits;
   limits.memory_bytes = (options.memory_mib << 20) - texture_bytes(source, options);
-  limits.upload_bytes_per_frame = options.upload_mib << 20;
+  limits.upload_bytes_per_frame = kUploadBytes;
   const std::uint64_t boxes = static_cast<std::uint64_t>(planes_of(source).count()) + 1;
   const std::uint64_t least = kTilesAtLeast * boxes * TileBox::most_bytes_of_a_tile(source);
   limits.enough_mib = (source.textures() == nullptr ? 1 : 3) * ((least >> 20U) + 1);
@@ -67,26 +70,22 @@ SharedGeometry shared_geometry(const TileSource& source) {
 
 }  // namespace
 
-std::optional<CastingSun> casting_sun(double azimuth_deg, double elevation_deg, double exaggeration,
-                                      std::optional<double> softness) {
+std::optional<CastingSun> casting_sun(double azimuth_deg, double elevation_deg, double exaggeration) {
   if (elevation_deg <= 0.0 || elevation_deg >= 90.0) return std::nullopt;
   const double over_true_deg = std::atan(std::tan(elevation_deg * kDegree) / exaggeration) / kDegree;
   if (std::max(elevation_deg, over_true_deg) > kOverhead_deg) return std::nullopt;
-  return CastingSun{azimuth_deg, elevation_deg, softness, exaggeration};
+  return CastingSun{azimuth_deg, elevation_deg, std::nullopt, exaggeration};
 }
 
 Session::Session(const TileSource& source, const Options& options)
     : view(options.view),
       sun_azimuth_deg(options.sun_azimuth_deg),
       sun_elevation_deg(options.sun_elevation_deg),
-      shadows(options.shadows),
       source_(source),
       whole_(whole_bounds(source)),
-      shadow_softness_(options.shadow_softness),
       shared_(shared_geometry(source)),
       renderer_(source, shared_),
       boxes_(source, shared_, limits_from(source, options)),
-      upload_bytes_(options.upload_mib << 20),
       far_distance_(options.far_distance) {
   const int levels = planes_of(source).levels();
   for (const std::optional<double>& level : {view.fixed_level, view.other_level}) {
@@ -187,7 +186,7 @@ void Session::prepare() {
   const double farthest = farthest_corner(source_.grid(), whole_, camera.eye, view.exaggeration);
   view.far_distance = far_distance_ ? *far_distance_ : 1.8 * farthest;
   reach_wanted_ = std::min(view.far_distance, farthest);
-  const auto sun = casting_sun(sun_azimuth_deg, sun_elevation_deg, view.exaggeration, shadow_softness_);
+  const auto sun = casting_sun(sun_azimuth_deg, sun_elevation_deg, view.exaggeration);
   view.shadows = shadows && sun;
   boxes_.set_sun(view.shadows ? sun : std::nullopt);
 }
@@ -205,8 +204,8 @@ void Session::frame() {
   boxes_.update(view, reach_wanted_);
   if (shows_textures()) {
     const std::uint64_t gone = boxes_.figures().upload_bytes;
-    textures_->update(boxes_.finest(), view, upload_bytes_ > gone ? upload_bytes_ - gone : 0);
-    if (texture_overview_) texture_overview_->update(upload_bytes_ / 4);
+    textures_->update(boxes_.finest(), view, kUploadBytes > gone ? kUploadBytes - gone : 0);
+    if (texture_overview_) texture_overview_->update(kUploadBytes / 4);
   }
   draw();
 }

@@ -18,8 +18,7 @@ namespace isohf::view {
 
 /// The sun that casts over true heights what this one casts over exaggerated ones: that of tan(elevation) /
 /// exaggeration. nullopt: it casts nothing, as it is night, or overhead.
-[[nodiscard]] std::optional<CastingSun> casting_sun(double azimuth_deg, double elevation_deg, double exaggeration,
-                                                    std::optional<double> softness);
+[[nodiscard]] std::optional<CastingSun> casting_sun(double azimuth_deg, double elevation_deg, double exaggeration);
 
 /// An open heightfield with a camera: all that window and picture have in common. A GL context must be
 /// current as long as it lives.
@@ -73,7 +72,7 @@ class Session {
   ViewState view;
   double sun_azimuth_deg;
   double sun_elevation_deg;
-  bool shadows;  ///< wanted
+  bool shadows = true;  ///< wanted
 
   /// True where the next frame would show the same: nothing is on its way.
   [[nodiscard]] bool is_settled() const;
@@ -96,13 +95,11 @@ class Session {
 
   const TileSource& source_;
   TileBounds whole_;
-  std::optional<double> shadow_softness_;
   SharedGeometry shared_;
   Renderer renderer_;
   PlaneBoxes boxes_;
   std::optional<TextureBox> textures_;
   std::optional<TextureOverview> texture_overview_;  ///< where there are planes
-  std::uint64_t upload_bytes_;                       ///< a frame, tiles and textures together
   Hud hud_;
   struct {
     std::vector<ColourStop> stops;

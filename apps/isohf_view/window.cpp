@@ -364,14 +364,13 @@ void run_window(const Options& options) {
   require_gl();
   Session session(*source, options);
   Controls controls(window.get(), session);
-  if (!options.overlay) controls.show_figures = Session::Figures::kNone;
   std::optional<Offscreen> picture;  // the last one
   using Clock = std::chrono::steady_clock;
   auto last = Clock::now();
   double smooth_s = 1.0 / 60.0;
   const std::atomic<bool>& interrupted = cli::watch_interrupts();
   std::int64_t drawn = 0;
-  for (int frame = 1; glfwWindowShouldClose(window.get()) == GLFW_FALSE; ++frame) {
+  while (glfwWindowShouldClose(window.get()) == GLFW_FALSE) {
     if (interrupted) throw Error(ErrorCode::kCancelled, "interrupted");
     glfwPollEvents();
     const auto now = Clock::now();
@@ -385,11 +384,10 @@ void run_window(const Options& options) {
     const bool iconified = width < 1 || height < 1;
     // Where nothing moves and nothing is to come the picture stays; an event wakes us.
     const bool fits = picture && picture->width() == width && picture->height() == height;
-    const bool stays = fits && !moves && options.frames == 0 && session.is_settled();
+    const bool stays = fits && !moves && session.is_settled();
     if (iconified || (stays && change == Controls::Change::kNone)) {
       glfwWaitEventsTimeout(kIdle_s);
       last = Clock::now();
-      --frame;
       continue;
     }
     smooth_s += 0.1 * (seconds - smooth_s);
@@ -401,7 +399,6 @@ void run_window(const Options& options) {
       session.frame();
       ++drawn;
     }
-    const bool is_last = options.frames > 0 && frame >= options.frames;
     if (controls.wants_picture) {
       controls.wants_picture = false;
       const std::string name = std::filesystem::absolute(next_picture_name()).string();
@@ -417,11 +414,7 @@ void run_window(const Options& options) {
     Session::Shown shown = controls.shown();
     shown.frames_per_second = 1.0 / smooth_s;
     session.draw_overlay(shown);
-    if (is_last && !options.screenshot.empty()) {
-      write_picture(options.screenshot, width, height, options.overwrite);
-    }
     glfwSwapBuffers(window.get());
-    if (is_last) break;
   }
   if (!options.common.json) return;
   print_result(options.common, "", [&] {

@@ -150,6 +150,28 @@ TEST_F(RendererTest, HasTheSkyOfTheBody) {
   EXPECT_LT(zenith("Moon")[2], 60) << "no air";
 }
 
+/// From a sun anywhere, but none at night.
+TEST_F(RendererTest, DrawsShadowsIfTheyAreWanted) {
+  const test::MemoryTiles source(small_grid());
+  const auto picture = [&](double azimuth_deg, double elevation_deg, bool shadows) {
+    Options options;
+    options.view.width = 160;
+    options.view.height = 120;
+    options.exaggeration = 4.0;
+    options.sun_azimuth_deg = azimuth_deg;
+    options.sun_elevation_deg = elevation_deg;
+    Session session(source, options);
+    session.shadows = shadows;
+    const Offscreen target(160, 120, GL_RGBA8);
+    session.complete_frame();
+    return target.read_rgba8();
+  };
+  for (const double azimuth_deg : {90.0, 180.0, 200.0}) {
+    EXPECT_NE(picture(azimuth_deg, 6.0, true), picture(azimuth_deg, 6.0, false)) << azimuth_deg;
+  }
+  EXPECT_EQ(picture(90.0, -3.0, true), picture(90.0, -3.0, false));
+}
+
 TEST_F(RendererTest, DrawsWhatLiesOnTheShoreInTheColourOfTheSea) {
   // All at 0 but a hill, which makes a colour of the palette wide.
   const test::MemoryTiles source(small_grid(), [](TileIndex tile, std::vector<std::uint16_t>& codes) {

@@ -167,19 +167,20 @@ TEST(CastShadows, SayWhatCouldNotBeRead) {
 TEST(CastShadows, AreThoseOfTheHeightsThatAreDrawn) {
   const MemoryTiles source(grid(), [](TileIndex tile, auto& codes) { raise_ridges(grid(), tile, codes); });
   const double over_true_deg = std::atan(std::tan(20.0 * kDegree) / 3.0) / kDegree;
-  const auto drawn = casting_sun(123.0, 20.0, 3.0, 2.0);
+  auto drawn = casting_sun(123.0, 20.0, 3.0);
   ASSERT_TRUE(drawn);
+  drawn->softness = 2.0;
   const TileShadow shadow = cast(source, *drawn, {{2, 2}}).front();
   EXPECT_EQ(shadow.depths, cast(source, {123.0, over_true_deg, 2.0}, {{2, 2}}).front().depths);
   EXPECT_NE(shadow.depths, cast(source, {123.0, 20.0, 2.0}, {{2, 2}}).front().depths);
 }
 
 TEST(CastingSun, CastsNothingAtNightOrOverhead) {
-  EXPECT_FALSE(casting_sun(90.0, -1.0, 1.0, 2.0));
-  EXPECT_FALSE(casting_sun(90.0, 0.0, 1.0, 2.0));
-  EXPECT_FALSE(casting_sun(90.0, 90.0, 1.0, 2.0));
-  EXPECT_FALSE(casting_sun(90.0, 89.8, 1.0, 2.0));
-  EXPECT_TRUE(casting_sun(0.0, 5.0, 1.0, 2.0));
+  EXPECT_FALSE(casting_sun(90.0, -1.0, 1.0));
+  EXPECT_FALSE(casting_sun(90.0, 0.0, 1.0));
+  EXPECT_FALSE(casting_sun(90.0, 90.0, 1.0));
+  EXPECT_FALSE(casting_sun(90.0, 89.8, 1.0));
+  EXPECT_TRUE(casting_sun(0.0, 5.0, 1.0));
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ TEST_F(TextureProgramTest, ShowsTexturesUnlessAskedForOtherColours) {
   convert({"--texture", folder_ / "photo.ppm"});
   const std::string textured = picture({});
   EXPECT_EQ(picture({"--mode", "texture"}), textured);
-  EXPECT_EQ(picture({"--memory", "16M", "--threads", "3", "--upload", "1M"}), textured);
+  EXPECT_EQ(picture({"--memory", "16M", "--threads", "3"}), textured);
   const std::string elevation = picture({"--mode", "elevation"});
   EXPECT_NE(elevation, textured);
   convert({});
