@@ -125,7 +125,6 @@ TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, doub
                   source.scale().offset * view.exaggeration - view.eye.y,
                   static_cast<double>(frame.anchor_tile.row) * grid.extent_z() - view.eye.z};
   frame.code_height = source.scale().scale * view.exaggeration;
-  frame.code_slope = frame.code_height;
   const WorldBounds covered = source.covered();
   frame.covered = {covered.x0 - view.eye.x, covered.z0 - view.eye.z, covered.x1 - view.eye.x, covered.z1 - view.eye.z};
   return frame;
@@ -424,15 +423,8 @@ FrameFigures Renderer::draw(const ViewState& view, const TileRange& top, const R
   glActiveTexture(GL_TEXTURE0);
   draw_opaque(frame);
   draw_sky(view);
-  frame.figures.passes = 1;
-  if (std::any_of(frame.items.begin(), frame.items.end(), fades)) {
-    draw_fading(frame);
-    ++frame.figures.passes;
-  }
-  if (view.wireframe) {
-    draw_wires(frame);
-    ++frame.figures.passes;
-  }
+  if (std::any_of(frame.items.begin(), frame.items.end(), fades)) draw_fading(frame);
+  if (view.wireframe) draw_wires(frame);
   glBindVertexArray(0);
   return frame.figures;
 }

@@ -29,7 +29,6 @@ struct FrameFigures {
   std::int64_t absent_tiles = 0;   ///< in the view, stored, not resident yet
   std::int64_t triangles = 0;
   std::int64_t draw_calls = 0;  ///< of terrain: two for each visible tile and pass, and sides
-  std::int64_t passes = 0;      ///< over the terrain: opaque, fading, wires
 };
 
 /// Finds a tile's buffers; nullptr where the tile is not resident.

@@ -111,9 +111,6 @@ TEST_F(PlanePictureTest, HasNoHolesAndNoMoreTrianglesThanItNeeds) {
       into.bind();
       session.complete_frame();
       figures = session.figures();
-      if (const char* folder = std::getenv("ISOHF_TEST_PICTURES")) {
-        into.write_picture(std::string(folder) + (&source == &plain ? "/plain.png" : "/planes.png"));
-      }
       return into.read_rgba8();
     };
     FrameFigures without;

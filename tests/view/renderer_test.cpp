@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <random>
 
 #include "camera.h"
@@ -54,14 +53,11 @@ TEST_F(RendererTest, DrawsEveryVisibleTileWithAtMostTwoCallsAPass) {
     const FrameFigures figures = renderer.draw(view, box.range(), [&](PlaneTile at) { return box.resident(at.tile); });
     EXPECT_EQ(figures.visible_tiles, 12);
     EXPECT_EQ(figures.absent_tiles, 0);
-    EXPECT_LE(figures.draw_calls, 2 * figures.visible_tiles * figures.passes);
-    EXPECT_EQ(figures.passes, level == std::floor(level) ? 1 : 2);
+    const int passes = level == std::floor(level) ? 1 : 2;
+    EXPECT_LE(figures.draw_calls, 2 * figures.visible_tiles * passes);
     check_gl("drawing");
   }
   const auto pixels = target.read_rgba8();
-  if (const char* folder = std::getenv("ISOHF_TEST_PICTURES")) {
-    write_picture(std::string(folder) + "/renderer.png", view.width, view.height);
-  }
   std::size_t green = 0;  // the lowland colours: the terrain is there
   for (std::size_t i = 0; i < pixels.size(); i += 4) green += pixels[i + 1] > pixels[i + 2] ? 1 : 0;
   EXPECT_GT(green, pixels.size() / 4 / 10);

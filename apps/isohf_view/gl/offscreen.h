@@ -45,7 +45,7 @@ class Offscreen {
   /// Binds the picture with each pixel's samples joined, to be read or written over.
   void bind_joined() const;
   /// As view::write_picture.
-  void write_picture(const std::string& path, bool overwrite = true) const;
+  void write_picture(const std::string& path, bool overwrite) const;
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
 
@@ -67,6 +67,6 @@ class Offscreen {
 [[nodiscard]] std::vector<std::uint8_t> read_pixels(int width, int height);
 
 /// Writes the bound framebuffer as an opaque RGB PNG file, in place of one of that name or not. Throws Error{kIo} naming it.
-void write_picture(const std::string& path, int width, int height, bool overwrite = true);
+void write_picture(const std::string& path, int width, int height, bool overwrite);
 
 }  // namespace isohf::view

@@ -197,20 +197,18 @@ void Overlay::text(float x, float y, std::string_view text, const OverlayColour&
   }
 }
 
-float Overlay::panel(float x, float y, const std::vector<std::string>& lines, bool right) {
+void Overlay::panel(float x, float y, const std::vector<std::string>& lines) {
   float widest = 0.0F;
   for (const std::string& line : lines) widest = std::max(widest, width_of(line));
   const float margin = 4.0F * size_;
   const float width = widest + 2.0F * margin;
   const float height = static_cast<float>(lines.size()) * line_height() + 2.0F * margin - 3.0F * size_;
-  if (right) x -= width;
   box(x, y, width, height, kPanel);
   float at = y + margin;
   for (const std::string& line : lines) {
     text(x + margin, at, line);
     at += line_height();
   }
-  return height;
 }
 
 void Overlay::finish() {

@@ -27,8 +27,8 @@ class Overlay {
   void line(float x0, float y0, float x1, float y1, float width, const OverlayColour& colour);
   /// x, y: the top left corner of the first glyph.
   void text(float x, float y, std::string_view text, const OverlayColour& colour = kInk);
-  /// Lines on a dark panel; returns its height. right: x is that of its right edge
-  float panel(float x, float y, const std::vector<std::string>& lines, bool right = false);
+  /// Lines on a dark panel.
+  void panel(float x, float y, const std::vector<std::string>& lines);
   void finish();
 
   [[nodiscard]] float width_of(std::string_view text) const;

@@ -32,7 +32,6 @@ uniform ivec4 world;            // the heightfield's first and last place, latti
 uniform vec2 sigma;             // world units of one object-space step in x and z
 uniform vec3 anchor;            // the anchor's place, seen from the eye; y: elevation of code 0
 uniform float code_height;      // world units of one code, exaggeration included
-uniform float code_slope;       // the same for normals
 uniform mat4 clip_from_eye;
 invariant gl_Position;          // programs with RIM and without put a vertex in the same place
 // Two slots of four: a software rasteriser pays for each slot and triangle.
@@ -95,8 +94,8 @@ vec3 vertex_normal(int v, int own) {
   }
   if (worst == 65535) return vec3(0.0, 1.0, 0.0);
 #endif
-  return normalize(vec3(float(rise_x) * code_slope / (float(steps_x * stride) * sigma.x), 1.0,
-                        float(rise_z) * code_slope / (float(steps_z * stride) * sigma.y)));
+  return normalize(vec3(float(rise_x) * code_height / (float(steps_x * stride) * sigma.x), 1.0,
+                        float(rise_z) * code_height / (float(steps_z * stride) * sigma.y)));
 }
 
 void main() {
@@ -278,7 +277,6 @@ void TerrainProgram::begin(const TileGrid& grid, const TerrainFrame& frame) cons
   glUniform3f(uniform("anchor"), static_cast<float>(frame.anchor.x), static_cast<float>(frame.anchor.y),
               static_cast<float>(frame.anchor.z));
   glUniform1f(uniform("code_height"), static_cast<float>(frame.code_height));
-  glUniform1f(uniform("code_slope"), static_cast<float>(frame.code_slope));
   glUniform4f(uniform("covered"), static_cast<float>(frame.covered.x0), static_cast<float>(frame.covered.z0),
               static_cast<float>(frame.covered.x1), static_cast<float>(frame.covered.z1));
   glUniformMatrix4fv(uniform("clip_from_eye"), 1, GL_FALSE, frame.clip_from_eye.floats().data());

@@ -28,7 +28,6 @@ struct TerrainFrame {
   Vec3 anchor;  ///< North-West corner of the anchor tile seen from the eye; y: elevation of code 0
   TileIndex anchor_tile{0, 0};
   double code_height = 1.0;  ///< world units of one code
-  double code_slope = 1.0;   ///< the same for normals
   /// What is shown of tiles that are cut, seen from the eye; all of the world unless said otherwise.
   WorldBounds covered{-1e30, -1e30, 1e30, 1e30};
 };

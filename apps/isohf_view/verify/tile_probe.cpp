@@ -24,7 +24,6 @@ TileProbe::TileProbe(const TileGrid& grid, const SharedGeometry& shared, double 
       target_(largest(MeshOracle(grid.shape()).windows(), &PixelWindow::width),
               largest(MeshOracle(grid.shape()).windows(), &PixelWindow::height), GL_RGBA32F) {
   frame_.code_height = code_height;
-  frame_.code_slope = code_height;
 }
 
 void TileProbe::begin(const TerrainProgram& program, const PixelWindow& window) {
