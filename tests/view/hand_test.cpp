@@ -74,6 +74,9 @@ TEST_P(Hand, DragsKeepThePickedPointUnderTheCursor) {
       ASSERT_LT(std::hypot(now.x - at.x, now.y - at.y), 2.0) << notches << " notches, move " << i;
     }
     it.hand.release();
+    const view::Camera still = it.camera;
+    it.hand.move({10.0, 10.0});
+    EXPECT_EQ(it.camera, still);
   }
 }
 

@@ -1,18 +1,18 @@
 // The real program, run as a person runs it.
 #include <gtest/gtest.h>
-#include <malloc.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <filesystem>
 
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "gl_test.h"
 #include "reading/place.h"
-#include "session.h"
 #include "support/rasters/analytic_archive.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
@@ -21,15 +21,6 @@ namespace isohf {
 namespace {
 
 using Outcome = test::RunResult;
-
-/// Memory of this process that no file backs; 0 if the system does not report it.
-double anonymous_mib() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.rfind("RssAnon:", 0) == 0) return std::stod(line.substr(8)) / 1024.0;
-  }
-  return 0.0;
-}
 
 class ViewProgramTest : public test::GlTest {
  protected:
@@ -124,8 +115,13 @@ TEST_F(ViewProgramTest, VerifiesGoodAndBadArchives) {
   const Outcome part = run(path("bad.isohf") + " --verify --tiles 2:3,0:1 --json");
   EXPECT_EQ(nlohmann::json::parse(part.out).at("tiles"), 1) << part.out;
   EXPECT_EQ(run(path("bad.isohf") + " --verify --tiles 1:2,1:2").exit_code, 3);
-  EXPECT_EQ(run(path("bad.isohf") + " --verify --tiles 2:4,0:1").exit_code, 2);
-  EXPECT_EQ(run(path("bad.isohf") + " --tiles 2:3,0:1").exit_code, 2);
+
+  ASSERT_EQ(test::run_isohf({"extract", path("good.isohf"), "-o", path("part.isohf"), "--tiles", "0:2,0:1"}).exit_code,
+            0);
+  EXPECT_NE(run(path("part.isohf") + " --verify")
+                .out.find("\nshadows: not looked at, as tiles that may cast them are "
+                          "elsewhere\n"),
+            std::string::npos);
 }
 
 TEST_F(ViewProgramTest, DrawsArchivesThatAreVoidOrOneTile) {
@@ -150,74 +146,82 @@ TEST_F(ViewProgramTest, GrowsNoMoreThanItsMemoryBound) {
 #endif
   const TileGrid wide = TileGrid::make(TileShape::make(68, 83, 4), 50, 40, 640.0, 640.0);
   test::write_analytic_archive(path("wide.isohf"), wide);
-  const auto source = view::open_archive(path("wide.isohf"));
-  const auto grown_mib = [&](std::uint64_t bound_mib) {
-    view::Options options;
-    options.view.width = 64;
-    options.view.height = 48;
-    options.far_distance = 9000.0;
-    options.memory_mib = bound_mib;
-    view::Session session(*source, options);
-    const view::Offscreen target(64, 48, GL_RGBA8);
-    ::malloc_trim(0);  // what earlier tests have freed is not to be filled again
-    const double before = anonymous_mib();
-    double most = before;
-    for (int frame = 0; frame < 300; ++frame) {
-      // Across it all, looking up: what the driver takes for triangles would hide what tiles take.
-      const double x = 1000.0 + frame * 100.0;
-      session.camera.look_at({x, 200.0, 9000.0}, {x + 1.0, 99000.0, 9000.0});
-      target.bind();
-      session.frame();
-      glFinish();
-      most = std::max(most, anonymous_mib());
+  const auto peak_mib = [&](const std::string& memory) {
+    // Looking up: what the driver takes for triangles would hide what tiles take.
+    const std::vector<std::string> words{ISOHF_BIN_DIR "/isohf-view",
+                                         path("wide.isohf"),
+                                         "-q",
+                                         "--overwrite",
+                                         "--size",
+                                         "64x48",
+                                         "--far",
+                                         "12000",
+                                         "--position",
+                                         "16000,200,12800",
+                                         "--look-at",
+                                         "16001,99000,12800",
+                                         "--screenshot",
+                                         path("up.png"),
+                                         "--memory",
+                                         memory};
+    std::vector<char*> command;
+    for (const std::string& word : words) command.push_back(const_cast<char*>(word.c_str()));
+    command.push_back(nullptr);
+    const pid_t child = ::fork();
+    if (child == 0) {
+      ::execv(command[0], command.data());
+      ::_exit(127);
     }
-    return most - before;
+    int status = -1;
+    rusage usage{};
+    EXPECT_EQ(::wait4(child, &status, 0, &usage), child);
+    EXPECT_EQ(status, 0);
+    return static_cast<double>(usage.ru_maxrss) / 1024.0;
   };
-  const double small = grown_mib(2);
-  const double large = grown_mib(18);
-  if (large == 0.0) GTEST_SKIP() << "the system does not say how much memory the process has";
-  // Half of the bound at least is put to use; a tenth is the allocator's rounding.
-  EXPECT_GT(large - small, 8.0);
-  EXPECT_LT(large - small, 1.1 * 16.0 + 1.0);
+  const double grown = peak_mib("34M") - peak_mib("2M");
+  // Half of the bound is put to use at least, the rest is for tiles on their way; a tenth is the allocator's rounding.
+  EXPECT_GT(grown, 0.4 * 32.0);
+  EXPECT_LT(grown, 1.1 * 32.0 + 1.0);
 }
 
 TEST_F(ViewProgramTest, RefusesInOneLine) {
-  const auto one_line = [](const Outcome& outcome) {
-    return std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1 && outcome.out.empty();
-  };
-  Outcome outcome = run(path("missing.isohf") + " --verify");
-  EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_TRUE(one_line(outcome)) << outcome.err;
   test::write_file(path("text.isohf"), "this is no archive\n");
-  outcome = run(path("text.isohf") + " --verify");
-  EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_TRUE(one_line(outcome)) << outcome.err;
-  outcome = run(path("good.isohf") + " --level 9 --screenshot " + path("no.png"));
-  EXPECT_EQ(outcome.exit_code, 2);
-  EXPECT_TRUE(one_line(outcome)) << outcome.err;
-  // The driver is told to offer no more than OpenGL 2.1.
-  outcome = run(path("good.isohf") + " --verify", "MESA_GL_VERSION_OVERRIDE=2.1");
-  EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_TRUE(one_line(outcome)) << outcome.err;
-  EXPECT_NE(outcome.err.find("OpenGL 3.3"), std::string::npos) << outcome.err;
-  // No display for a window.
-  outcome = run(path("good.isohf"), "env -u DISPLAY -u WAYLAND_DISPLAY");
-  EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_NE(outcome.err.find("; --screenshot PICTURE.png draws without one\n"), std::string::npos) << outcome.err;
-  EXPECT_TRUE(one_line(outcome)) << outcome.err;
+  const std::string good = path("good.isohf");
+  const std::string shot = " --screenshot " + path("no.png");
+  struct Case {
+    std::string arguments;
+    int exit_code;
+    std::string message;
+    std::string before = "";
+  };
+  for (const Case& one : std::vector<Case>{
+           {path("missing.isohf") + " --verify", 1, "no such file"},
+           {path("text.isohf") + " --verify", 1, "text.isohf"},
+           {good + " --verify", 1, "OpenGL 3.3", "MESA_GL_VERSION_OVERRIDE=2.1"},
+           {good, 1, "; --screenshot PICTURE.png draws without one\n", "env -u DISPLAY -u WAYLAND_DISPLAY"},
+           {"", 2, "isohf-view: no ARCHIVE given (usage: isohf-view ARCHIVE [options])"},
+           {good + " --verfy", 2, "isohf-view: unknown option --verfy; did you mean --verify?"},
+           {good + " --verify --tiles 2:4,0:1", 2, "--tiles: the archive has 3 by 2 tiles"},
+           {good + " --tiles 2:3,0:1", 2, "--tiles needs --verify"},
+           {good + " --level 9" + shot, 2, "--level 9: "},
+           {good + " --sun 3" + shot, 2, "--sun: found '3', must be AZIMUTH,ELEVATION"},
+           {good + " --date 2026-06-21" + shot, 2, "--date: "},
+           {good + " --time 12:00" + shot, 2, "--time needs --date"},
+           {good + " --sun 1,2 --date 2026-06-21" + shot, 2, "--sun excludes --date"},
+           {good + " --size 64x48 --legend" + shot, 2, "--legend needs pictures of at least"},
+           {good + " --legend --verify", 2, "--legend needs --screenshot"},
+           {good + " --palette pink" + shot, 2, "--palette: "},
+           {good + " --palette " + path("none.txt") + shot, 1, "none.txt"}}) {
+    SCOPED_TRACE(one.before + " " + one.arguments);
+    const Outcome outcome = run(one.arguments, one.before);
+    EXPECT_EQ(outcome.exit_code, one.exit_code);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_NE(outcome.err.find(one.message), std::string::npos) << outcome.err;
+  }
 }
 
-TEST_F(ViewProgramTest, SpeaksAsEveryCommandDoes) {
-  const auto refused = [&](const std::string& arguments, const std::string& message) {
-    const Outcome outcome = run(arguments);
-    EXPECT_EQ(outcome.exit_code, 2) << arguments;
-    EXPECT_EQ(outcome.out, "");
-    EXPECT_EQ(outcome.err.rfind("isohf-view: " + message, 0), 0U) << outcome.err;
-    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-  };
-  refused("", "no ARCHIVE given (usage: isohf-view ARCHIVE [options])");
-  refused(path("good.isohf") + " --sun 3", "--sun: found '3', must be AZIMUTH,ELEVATION");
-  refused(path("good.isohf") + " --verfy", "unknown option --verfy; did you mean --verify?");
+TEST_F(ViewProgramTest, HelpAndVersionAreThoseOfEveryCommand) {
   const Outcome help = run("--help");
   EXPECT_EQ(help.exit_code, 0);
   EXPECT_NE(help.out.find("Usage: isohf-view ARCHIVE [options]\n"), std::string::npos);
@@ -263,15 +267,6 @@ TEST_F(ViewProgramTest, SaysThatOptionsForARasterAreThoseOfConvert) {
   EXPECT_NE(notes.err.find("nor is it a raster of a kind that is viewed"), std::string::npos) << notes.err;
 }
 
-TEST_F(ViewProgramTest, VerifyOfAPartSaysWhyItLooksAtNoShadows) {
-  ASSERT_EQ(test::run_isohf({"extract", path("good.isohf"), "-o", path("part.isohf"), "--tiles", "0:2,0:1"}).exit_code,
-            0);
-  const Outcome part = run(path("part.isohf") + " --verify");
-  EXPECT_EQ(part.exit_code, 0) << part.out << part.err;
-  EXPECT_NE(part.out.find("\nshadows: not looked at, as tiles that may cast them are elsewhere\n"), std::string::npos)
-      << part.out;
-}
-
 TEST_F(ViewProgramTest, ShowsARasterAndLeavesNothingBehind) {
   const std::string raster = ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif";
   const std::string folder = path("scratch");
@@ -315,8 +310,6 @@ TEST_F(ViewProgramTest, WritesALegendOnPictures) {
   const Outcome written = run(shot + " --legend");
   EXPECT_EQ(written.exit_code, 0) << written.err;
   EXPECT_NE(text("legend.png"), bare);
-  EXPECT_EQ(run(path("good.isohf") + " --size 64x48 --legend --screenshot " + path("small.png")).exit_code, 2);
-  EXPECT_EQ(run(path("good.isohf") + " --legend --verify").exit_code, 2);
 }
 
 TEST_F(ViewProgramTest, LeavesNothingInAFolderThatIsTooSmallForARaster) {
@@ -337,14 +330,6 @@ TEST_F(ViewProgramTest, LeavesNothingInAFolderThatIsTooSmallForARaster) {
   EXPECT_TRUE(std::filesystem::is_empty(folder));
 }
 
-TEST_F(ViewProgramTest, RefusesADayWhereTheSunsWayIsNotKnown) {
-  const Outcome refused = run(path("good.isohf") + " --date 2026-06-21 --screenshot " + path("day.png"));
-  EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_NE(refused.err.find("--date: "), std::string::npos) << refused.err;
-  EXPECT_EQ(run(path("good.isohf") + " --time 12:00").exit_code, 2);
-  EXPECT_EQ(run(path("good.isohf") + " --sun 1,2 --date 2026-06-21").exit_code, 2);
-}
-
 TEST_F(ViewProgramTest, TakesColoursFromAFile) {
   test::write_file(path("red.txt"), "0% 255 0 0\n100% 255 0 0\n");
   const std::string shot = path("good.isohf") + " --size 64x48 --overwrite --screenshot " + path("red.png");
@@ -352,8 +337,6 @@ TEST_F(ViewProgramTest, TakesColoursFromAFile) {
   const std::string own = text("red.png");
   EXPECT_EQ(run(shot + " --palette " + path("red.txt")).exit_code, 0);
   EXPECT_NE(text("red.png"), own);
-  EXPECT_EQ(run(shot + " --palette " + path("none.txt")).exit_code, 1);
-  EXPECT_EQ(run(shot + " --palette pink").exit_code, 2);
 }
 
 TEST_F(ViewProgramTest, ReadsItsPartOfAConfigFileForAllCommands) {
