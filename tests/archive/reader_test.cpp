@@ -19,6 +19,7 @@
 #include "isohf/archive/container/member_tables.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/error.h"
+#include "isohf/verify.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -26,6 +27,7 @@ namespace {
 
 using test::TemporaryFolder;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
 /// An archive's members apart, to be put together again in some other way.
 struct Parts {
@@ -229,6 +231,23 @@ TEST_F(ArchiveReaderTest, ReadsWhatZipMadeOfIt) {
                               .c_str()),
               0);
     EXPECT_EQ(read_all(test::read_bytes(folder_ / "b.zip")), "by directory") << level;
+  }
+}
+
+TEST_F(ArchiveReaderTest, ReadsWhatOtherToolsAddedToIt) {
+  if (std::system("command -v zip python3 >/dev/null 2>&1") != 0) GTEST_SKIP() << "zip or python3 is not installed";
+  const std::vector<std::byte> note(5000, std::byte{7});
+  test::write_file(folder_ / "note", note);
+  for (const char* command :
+       {"zip -q a.isohf note", "zip -q -g a.isohf note",
+        "python3 -c \"import zipfile; z = zipfile.ZipFile('a.isohf', 'a'); z.write('note'); z.close()\""}) {
+    test::write_file(path(), good_);
+    ASSERT_EQ(std::system(fmt::format("cd {} && {}", folder_ / ".", command).c_str()), 0);
+    EXPECT_EQ(read_all(test::read_bytes(path())), "") << command;
+    const ArchiveReader archive(path());
+    EXPECT_THAT(archive.check_structure(), IsEmpty()) << command;
+    EXPECT_EQ(archive.read_member("note"), note) << command;
+    for (const Finding& finding : verify_archive(path()).findings) EXPECT_NE(finding.id, finding::kStructure);
   }
 }
 

@@ -6,7 +6,6 @@ namespace isohf::cli {
 
 /// The commands, as Command::run is.
 
-int command_attach(const Arguments& arguments);
 int command_convert(const Arguments& arguments);
 int command_diff(const Arguments& arguments);
 int command_export(const Arguments& arguments);

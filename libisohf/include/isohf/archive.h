@@ -108,7 +108,7 @@ class ArchiveReader {
   /// What there is of each kind of members, the tiles first, without a look at any of them. Of version 1, and where the
   /// archive is read by the directory, all of it is gone through once.
   [[nodiscard]] const std::vector<MemberTable>& tables() const;
-  /// Members in none of tables(), in file order: the metadata, the index, and what was attached.
+  /// Members in none of tables(), in file order: the metadata, the index, and what other tools added.
   [[nodiscard]] const std::vector<MemberEntry>& loose_members() const;
   /// All but the tiles, in file order: goes through the whole directory and, once read, keeps it.
   [[nodiscard]] const std::vector<MemberEntry>& members() const;

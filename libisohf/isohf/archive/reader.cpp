@@ -448,7 +448,7 @@ std::vector<std::string> ArchiveReader::check_structure() const {
     const ArchiveDirectory directory = read_directory(state.file, state.end, state.tiles->grids(), complain);
     if (!state.tiles->by_directory()) {
       state.tiles->check_against(directory, complain);
-      // An archive to which another tool attached something is held against the rules of ZIP alone.
+      // An archive to which another tool added something is held against the rules of ZIP alone.
       if (state.own.are_last || metadata().version == 1)
         check_profile(state.file, state.end, metadata().version, complain);
     }

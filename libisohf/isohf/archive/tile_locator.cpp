@@ -251,7 +251,7 @@ void TileLocator::check_pages(const ArchiveDirectory& directory, const Complain&
     members[plane_tables_[static_cast<std::size_t>(tile.plane)]].push_back(
         {static_cast<std::uint64_t>(tile.flat), &tile.entry, tile.data_offset});
   for (const ArchiveDirectory::Member& member : directory.members) {
-    // What stands behind the index was attached to the archive.
+    // What stands behind the index was added by another tool.
     if (member.data_offset > data_end_) continue;
     const auto place = table_place(member.entry.name);
     const auto table = place ? paged_->find_table(place->table) : std::nullopt;

@@ -167,9 +167,6 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(0, "formats", {"formats"});
   documents.run(0, "program", {"--version"});
   documents.run(0, "program", {"--help"});
-  test::write_file(folder / "note.txt", std::vector<std::byte>(9));
-  documents.run(0, "attach", {"attach", a, folder / "note.txt"});
-  documents.run(2, "error", {"attach", a, folder / "note.txt"});
   documents.run(0, "convert", {"convert", coast, folder / "plain.isohf", "--no-planes"});
   documents.run(0, "planes", {"planes", folder / "plain.isohf", "-o", folder / "planes.isohf"});
   documents.run(2, "error", {"planes", folder / "plain.isohf", "-o", folder / "planes.isohf"});

@@ -2,7 +2,6 @@
 
 import hashlib
 import re
-import shutil
 import struct
 
 # Conversions: archive, options.
@@ -38,9 +37,8 @@ READERS = {"restore": ("bilinear", ["restore", "IN", "OUT.npy"]),
            "sample, 1,000,000 places": ("bilinear", ["sample", "IN"]),
            "info": ("bilinear", ["info", "IN"]),
            "extract": ("bilinear", ["extract", "IN", "-o", "OUT.isohf", "--tiles", "0:9,0:1"]),
-           "extract --plane 1": ("bilinear", ["extract", "IN", "-o", "OUT.isohf", "--plane", "1"]),
-           "attach": ("bilinear", ["attach", "COPY", "SOME"])}
-WITHOUT_LIMIT = {"info", "extract", "extract --plane 1", "attach"}  # which hold as little whatever the width
+           "extract --plane 1": ("bilinear", ["extract", "IN", "-o", "OUT.isohf", "--plane", "1"])}
+WITHOUT_LIMIT = {"info", "extract", "extract --plane 1"}  # which hold as little whatever the width
 DIFFER = 3  # what diff and verify end with where there is something to tell
 
 
@@ -87,14 +85,13 @@ def measure_size(bench, size, limit, found, rows):
     source = bench.terrain(size)
     archives = {kind: bench.work / f"memory_{i}.isohf" for i, kind in enumerate(KINDS)}
     output = bench.work / "memory_out"
-    words = {"SOURCE": source, "FULL": size, "seeds": archives["with seeds"], "bspline5": archives["bspline5"],
-             "SOME": __file__, "COPY": f"{output}.isohf"}
+    words = {"SOURCE": source, "FULL": size, "seeds": archives["with seeds"], "bspline5": archives["bspline5"]}
     commands = {f"convert, {kind}": (["convert", source, "-o", archives[kind], *options, "--overwrite", "--quiet"],
                                      archives[kind], None) for kind, options in KINDS.items()}
     for name, (kind, command) in READERS.items():
         command = [str(archives[kind] if w == "IN" else words.get(w, w)).replace("OUT", str(output)) for w in command]
         written = next((w for w in command if w.startswith(str(output))), None)
-        if written is not None and name != "attach":
+        if written is not None:
             command += ["--overwrite", "--quiet"]
         if name.startswith("sample"):
             command += ["--binary"]
@@ -106,9 +103,7 @@ def measure_size(bench, size, limit, found, rows):
 
         refusal = {}
 
-        def run(bound, command=command, written=written, archive=archive, given=given, name=name):
-            if name == "attach":
-                shutil.copy(archive, written)
+        def run(bound, command=command, written=written, given=given, name=name):
             measured = bench.run_or_refusal(*command, *bound, given=given, passing=(0, DIFFER))
             if "refused" in measured:
                 refusal.update(measured)  # by what comes later, or has a half of it
