@@ -138,10 +138,8 @@ void add_picture(CommandLine& line, Options& options) {
         options.view.mode = kModes[cli::parse_word(text, {"elevation", "levels", "strips", "texture", "normals"})];
         options.mode_given = true;
       });
-  line.option("--palette", "NAME|FILE",
-              "Colours of elevations: elevation, gray, mars (default: its body's), or a text file of elevations and "
-              "colours as for gdaldem color-relief",
-              [&](const std::string& text) { options.palette_file = cli::parse_palette(text, options.palette); });
+  line.option("--palette", "NAME", "Colours of elevations: elevation, gray, mars (default: its body's)",
+              [&](const std::string& text) { options.palette = cli::parse_palette(text); });
   line.option("--level", "L[,L2]",
               "Draw every tile at this level of detail, 0 to 12, fractional; two levels alternate like a chessboard",
               [&](const std::string& text) {

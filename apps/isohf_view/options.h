@@ -25,7 +25,6 @@ struct Options {
   std::optional<Vec3> look_at;
   std::optional<SolarTime> date;  ///< the sun of that day and time
   std::optional<ShadePalette> palette;
-  std::string palette_file;
   std::optional<isohf::TileRange> tiles;  ///< that --verify looks at
   double sun_azimuth_deg = 300.0;
   double sun_elevation_deg = 35.0;

@@ -110,10 +110,7 @@ Session::Session(const TileSource& source, const Options& options)
     throw Error(ErrorCode::kInvalidArgument, "--mode texture: this archive has no textures; convert with --texture");
   }
   legend_ = {{}, whole_.low / source.world_per_elevation(), whole_.high / source.world_per_elevation()};
-  if (const Metadata* metadata = source.metadata()) {
-    legend_.stops = options.palette_file.empty() ? shade_colours(*metadata, options.palette)
-                                                 : read_colour_relief(options.palette_file, *metadata);
-  }
+  if (const Metadata* metadata = source.metadata()) legend_.stops = shade_colours(*metadata, options.palette);
   renderer_.set_palette(legend_.stops, legend_.low, legend_.high);
   driver_ = driver_name();
   if (options.date) begin_day(*options.date);

@@ -290,9 +290,6 @@ TEST_F(HandedIn, FunctionsOnArchivesRefuseWhatIsNotThere) {
               HasSubstr("no reference system"));
   EXPECT_THAT(refusal([&] { shade_rows(reader, {}, nullptr); }), HasSubstr("there is no function"));
   EXPECT_THAT(refusal([&] { subtract_archives(archive(), archive(), nullptr); }), HasSubstr("there is no function"));
-  ShadeOptions shading;
-  shading.colours = {{kNan, 1, 2, 3}};
-  EXPECT_THAT(refusal([&] { (void)shade(reader, shading); }), HasSubstr("must be numbers"));
   const auto source = waves();
   for (const std::int64_t points : {std::int64_t{-1}, kHuge}) {
     EXPECT_THAT(refusal([&] { (void)compare_with_source(reader, *source, {}, points); }),

@@ -330,15 +330,6 @@ TEST_F(ViewProgramTest, LeavesNothingInAFolderThatIsTooSmallForARaster) {
   EXPECT_TRUE(std::filesystem::is_empty(folder));
 }
 
-TEST_F(ViewProgramTest, TakesColoursFromAFile) {
-  test::write_file(path("red.txt"), "0% 255 0 0\n100% 255 0 0\n");
-  const std::string shot = path("good.isohf") + " --size 64x48 --overwrite --screenshot " + path("red.png");
-  EXPECT_EQ(run(shot).exit_code, 0);
-  const std::string own = text("red.png");
-  EXPECT_EQ(run(shot + " --palette " + path("red.txt")).exit_code, 0);
-  EXPECT_NE(text("red.png"), own);
-}
-
 TEST_F(ViewProgramTest, ReadsItsPartOfAConfigFileForAllCommands) {
   test::write_file(path("all.toml"),
                    "quiet = true\ndensity = 0.5\n[convert]\nlevel = 3\n[view]\nsize = \"64x48\"\nquiet = false\n"

@@ -90,11 +90,9 @@ std::pair<std::int64_t, std::int64_t> parse_size(const std::string& text, std::i
   }
 }
 
-std::string parse_palette(const std::string& text, std::optional<ShadePalette>& palette) {
+ShadePalette parse_palette(const std::string& text) {
   constexpr ShadePalette kPalettes[] = {ShadePalette::kElevation, ShadePalette::kGray, ShadePalette::kMars};
-  if (text.find_first_of("./") != std::string::npos) return text;
-  palette = kPalettes[parse_word(text, {"elevation", "gray", "mars"})];
-  return {};
+  return kPalettes[parse_word(text, {"elevation", "gray", "mars"})];
 }
 
 std::array<int, 3> parse_date(const std::string& text) {

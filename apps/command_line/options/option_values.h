@@ -25,8 +25,7 @@ namespace isohf::cli {
                                                                std::int64_t most);
 /// "MIN:MAX" or "MIN,MAX", MIN < MAX.
 [[nodiscard]] std::pair<double, double> parse_range(const std::string& text);
-/// The name of a palette, or of a file, which is returned: what has a dot or a slash.
-[[nodiscard]] std::string parse_palette(const std::string& text, std::optional<ShadePalette>& palette);
+[[nodiscard]] ShadePalette parse_palette(const std::string& text);
 /// A day of the calendar, "2026-06-21": year, month, day.
 [[nodiscard]] std::array<int, 3> parse_date(const std::string& text);
 /// A time of day, "14" or "14:30": hours from 0 to 24.

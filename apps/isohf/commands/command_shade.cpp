@@ -38,8 +38,8 @@ constexpr double kHighest_deg = 89.9;
 constexpr const char* kShadeFooter =
     R"(The picture covers what the input covered, North at the top; where there is no elevation it is transparent.
 North is the map's, as with GDAL. Shadows fall for a sun that stands anywhere; the ground beyond what the input covered casts
-none. --hillshade, --multidirectional, --slope and --aspect are those of gdaldem, by Horn's formula: one band. Hillshades
-and shadow masks hold 1 to 255, and 0 where there is no elevation; slopes and aspects hold degrees, and -9999.
+none. --hillshade is that of gdaldem, by Horn's formula: one band. Hillshades and shadow masks hold 1 to 255, and 0 where
+there is no elevation.
 .tif has the georeference, .png a world file beside it. .exr holds light, or shares from 0 to 1.
 --date asks for the sun over the archive's middle, on Earth or Mars, at --time: mean solar time there, which is noon where the
 sun stands highest, but for a quarter of an hour. --hours draws a picture for each hour of sun, OUTPUT-06.png and so on.
@@ -63,7 +63,6 @@ struct ShadeCommand {
   bool no_shadow = false;
   std::optional<std::int64_t> longest;  ///< pixels of the longer side
   bool no_relief = false;
-  std::string palette;  ///< a file of colours
   std::optional<double> azimuth;
   std::optional<double> elevation;
   std::optional<SolarTime> date;
@@ -79,9 +78,6 @@ struct Kind {
 };
 constexpr Kind kKinds[] = {
     {"--hillshade", "Grey, by how slopes face the sun: one band, as gdaldem hillshade", ShadeKind::kHillshade},
-    {"--multidirectional", "The same with light from four sides", ShadeKind::kMultidirectional},
-    {"--slope", "Slopes in degrees", ShadeKind::kSlope},
-    {"--aspect", "The directions that slopes face, in degrees clockwise from North", ShadeKind::kAspect},
     {"--shadow-mask", "The share of the sun that is seen", ShadeKind::kShadowMask},
 };
 
@@ -107,24 +103,14 @@ std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
     rivals.emplace_back(option);
     line.exclusive(rivals);
   }
-  for (const Kind& kind : kKinds) {
-    if (kind.kind == ShadeKind::kShadowMask) continue;
-    line.exclusive({kind.option, "--shadow-softness"});
-    if (kind.kind != ShadeKind::kHillshade) {
-      line.exclusive({kind.option, "--azimuth"});
-      line.exclusive({kind.option, "--date"});
-    }
-    if (kind.kind == ShadeKind::kSlope || kind.kind == ShadeKind::kAspect) {
-      line.exclusive({kind.option, "--sun-elevation"});
-    }
-  }
+  line.exclusive({"--hillshade", "--shadow-softness"});
   line.exclusive({"--no-shadow", "--shadow-softness"});
   line.group("Light");
   line.option("--azimuth", "DEG",
               "Where the sun stands, clockwise from North; N, E, S or W (default 270; --hillshade 315)",
               [&](const std::string& text) { options.azimuth = parse_azimuth(text); });
   line.option("--altitude,--sun-elevation", "DEG",
-              "Height of the sun above the horizon, 0.01 to 90 (default 15; --hillshade, --multidirectional 45)",
+              "Height of the sun above the horizon, 0.01 to 90 (default 15; --hillshade 45)",
               [&](const std::string& text) { options.elevation = parse_altitude(text); });
   line.option("--date", "YYYY-MM-DD", "The sun of that day over the archive's middle (Earth and Mars)",
               [&](const std::string& text) {
@@ -156,10 +142,8 @@ std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
   line.option("--z-factor,--exaggeration", "F", "Draw heights F times as high (default 1)",
               [&](const std::string& text) { request.exaggeration = parse_positive_number(text); });
   line.flag("--texture", "Show the archive's textures; where there is none, the palette's colours", request.texture);
-  line.option("--palette", "NAME|FILE",
-              "Colours of the ground: elevation, gray, mars (default: its body's), or a text file of elevations and "
-              "colours as for gdaldem color-relief",
-              [&](const std::string& text) { options.palette = parse_palette(text, request.palette); });
+  line.option("--palette", "NAME", "Colours of the ground: elevation, gray, mars (default: its body's)",
+              [&](const std::string& text) { request.palette = parse_palette(text); });
   add_work_options(line, options.work);
   add_memory_options(line, "OUTPUT's folder", options.work);
   add_common_options(line, options.common);
@@ -173,7 +157,7 @@ std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
   }
   request.shadows = !options.no_shadow;
   request.relief = !options.no_relief;
-  const bool as_gdal = request.kind == ShadeKind::kHillshade || request.kind == ShadeKind::kMultidirectional;
+  const bool as_gdal = request.kind == ShadeKind::kHillshade;
   request.sun_azimuth_deg = options.azimuth.value_or(as_gdal ? 315.0 : 270.0);
   request.sun_elevation_deg = options.elevation.value_or(as_gdal ? 45.0 : 15.0);
   return options;
@@ -241,7 +225,7 @@ std::vector<Frame> frames_of(const ShadeCommand& options, ArchiveReader& archive
 void tell_flat_relief(const Metadata& metadata, const ShadeOptions& request) {
   constexpr double kFlat = 0.01;
   constexpr double kHilly = 0.2;
-  const bool is_seen = request.relief && request.kind <= ShadeKind::kMultidirectional;
+  const bool is_seen = request.relief && request.kind != ShadeKind::kShadowMask;
   const WorldBounds& ground = metadata.valid;
   const double range = metadata.statistics.max.value_or(0.0) - metadata.statistics.min.value_or(0.0);
   const double share = range / std::min(ground.x1 - ground.x0, ground.z1 - ground.z0);
@@ -271,7 +255,6 @@ int run(ShadeCommand options) {
   if (!common.quiet) tell_flat_relief(metadata, request);
   const GridSize size = request.size.value_or(shade_size(archive, options.longest));
   request.size = size;
-  if (!options.palette.empty()) request.colours = read_colour_relief(options.palette, archive.metadata());
   request.elevation_units_per_world_unit = 1.0 / world_per_elevation(archive.metadata());
   request.floats = lower_case(std::filesystem::path(options.output).extension().string()) == ".exr";
   const ShadeSamples samples = shade_samples(request);

@@ -6,7 +6,6 @@
 #include <functional>
 #include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "isohf/archive.h"
@@ -15,18 +14,15 @@
 #include "isohf/raster.h"
 #include "isohf/surface.h"
 
-/// Pictures of an archive's surface: shaded relief with cast shadows and textures, and what GDAL's gdaldem makes of it.
+/// Pictures of an archive's surface: shaded relief with cast shadows and textures, hillshades, and shadows alone.
 
 namespace isohf {
 
 /// What is drawn. All but the first have one channel.
 enum class ShadeKind {
-  kPicture,           ///< colours, sun, sky and cast shadows
-  kHillshade,         ///< 1...255, as `gdaldem hillshade`; 0 where there is no elevation
-  kMultidirectional,  ///< the same from four sides, as its -multidirectional
-  kSlope,             ///< degrees; kShadeVoid where there is no elevation
-  kAspect,            ///< degrees clockwise from North that a slope faces; kShadeVoid also on level ground
-  kShadowMask,        ///< share of the sun that is seen, 1...255; 0 where there is no elevation
+  kPicture,     ///< colours, sun, sky and cast shadows
+  kHillshade,   ///< 1...255, as `gdaldem hillshade`; 0 where there is no elevation
+  kShadowMask,  ///< share of the sun that is seen, 1...255; 0 where there is no elevation
 };
 
 /// Colours of the ground by elevation: meadows to snow, and the sea below 0 on Earth; greys; the dust of Mars.
@@ -46,10 +42,6 @@ struct ColourStop {
 /// The palette's colours over the archive's range, by rising elevation; at one elevation there may be two. nullopt: the
 /// palette of its body, grey where that is neither Earth nor Mars.
 [[nodiscard]] std::vector<ColourStop> shade_colours(const Metadata& metadata, std::optional<ShadePalette> palette = {});
-
-/// The colours of a text file for `gdaldem color-relief`: lines of an elevation, or a percentage of the archive's range,
-/// and red, green, blue, or a colour's name. Throws Error naming the path: kIo, kInvalidArgument with the line.
-[[nodiscard]] std::vector<ColourStop> read_colour_relief(const std::string& path, const Metadata& metadata);
 
 /// A day of the Gregorian calendar and a time of day, 0 to 24: mean solar time, which is near to what clocks say, and
 /// takes no account of time zones. On Mars hours are 24 of its own day, the date is the Earth's.
@@ -95,7 +87,6 @@ struct ShadeOptions {
   /// it is seen from the archive's body, which grows with the caster's distance.
   std::optional<double> softness;
   std::optional<ShadePalette> palette;  ///< nullopt: its body's
-  std::vector<ColourStop> colours;      ///< in place of the palette, by rising elevation; linear between them
   bool texture = false;                 ///< the archive's textures where it has them, over the palette's colours
   double elevation_units_per_world_unit = 1.0;  ///< feet for one metre, say; > 0
   /// Samples are floats: linear light with premultiplied alpha, or shares from 0 to 1, NaN where there is no elevation.
@@ -116,9 +107,6 @@ struct ShadeSamples {
 };
 [[nodiscard]] ShadeSamples shade_samples(const ShadeOptions& options);
 
-/// Slopes and aspects without elevation, as GDAL has them.
-inline constexpr float kShadeVoid = -9999.0F;
-
 /// A pixel for each lattice step, at most 2048 a side; or so many along the longer side, and as many as keep the shape
 /// along the other.
 [[nodiscard]] GridSize shade_size(const ArchiveReader& archive, std::optional<std::int64_t> longest = {});
@@ -136,7 +124,7 @@ using TakeShadedRows = std::function<void(std::span<const std::byte> rows)>;
 ShadeReport shade_rows(const ArchiveReader& archive, const ShadeOptions& options, const TakeShadedRows& take,
                        const Job& job = {});
 
-/// The whole picture at once, of bytes: not of slopes and aspects, nor with `floats`.
+/// The whole picture at once, of bytes: not with `floats`.
 [[nodiscard]] Picture shade(const ArchiveReader& archive, const ShadeOptions& options, const Job& job = {});
 
 }  // namespace isohf

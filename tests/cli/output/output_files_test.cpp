@@ -165,7 +165,6 @@ TEST_F(OutputFiles, UsageErrorsOfEveryWriterExitWithTwo) {
   expect_refused({"export", "a.isohf", "x.png", "--type", "f32"}, "PNG stores uint8 and uint16, not float32");
   expect_refused({"export", "a.isohf", "x.hgt"}, "an HGT tile has");
   expect_refused({"restore", "a.isohf", "x.hgt"}, "an HGT tile has");
-  expect_refused({"shade", "a.isohf", "x.png", "--slope"}, "PNG stores uint8 and uint16, not float32");
 }
 
 TEST_F(OutputFiles, AFullDiskIsToldWithTheFileAndTheCause) {

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <numbers>
 
 #include "isohf/base/simd.h"
@@ -45,29 +44,6 @@ ISOHF_KERNEL void hillshade(const float* north, const float* here, const float* 
   }
 }
 
-/// Light from 225, 270, 315 and 360 degrees, each weighted by the square of the sine of its angle to the aspect
-/// (Mark 1992, USGS Open-File Report 92-422), as GDAL has it.
-ISOHF_KERNEL void multidirectional(const float* north, const float* here, const float* south, int count, float per_x,
-                                   float per_z, float sin_sun, float cos_sun, float* __restrict out) {
-  for (int i = 0; i < count; ++i) {
-    const Slope slope = slope_at(north, here, south, i, per_x, per_z);
-    const float x = -slope.x;  // downhill eastwards
-    const float y = slope.z;   // downhill northwards
-    constexpr float kHalfRoot = 0.70710678F;
-    const auto lit = [&](float towards) {
-      const float light = sin_sun + towards * cos_sun;
-      return light < 0.0F ? 0.0F : light;
-    };
-    const float steepness = x * x + y * y;
-    const float weight_225 = 0.5F * steepness + x * y;
-    const float weight_315 = steepness - weight_225;
-    const float sum = weight_225 * lit((-x - y) * kHalfRoot) + x * x * lit(-x) + weight_315 * lit((y - x) * kHalfRoot) +
-                      y * y * lit(y);
-    const float share = 0.5F * sum / (steepness * std::sqrt(1.0F + steepness));
-    out[i] = steepness == 0.0F ? sin_sun : share;
-  }
-}
-
 ISOHF_KERNEL void normals(const float* north, const float* here, const float* south, int count, float per_x,
                           float per_z, float* __restrict x, float* __restrict y, float* __restrict z) {
   for (int i = 0; i < count; ++i) {
@@ -94,8 +70,6 @@ float per_z(const PixelSize& pixel) {
   return static_cast<float>(1.0 / (8.0 * pixel.z));
 }
 
-constexpr float kDegrees = static_cast<float>(180.0 / std::numbers::pi);
-
 }  // namespace
 
 Normal towards_sun(double azimuth_deg, double elevation_deg) {
@@ -108,32 +82,6 @@ Normal towards_sun(double azimuth_deg, double elevation_deg) {
 void relief_hillshade(const ReliefRows& rows, const PixelSize& pixel, const Normal& sun, std::span<float> out) {
   vectorised<hillshade>(rows.north, rows.here, rows.south, static_cast<int>(out.size()), per_x(pixel), per_z(pixel),
                         sun.x, sun.y, sun.z, out.data());
-}
-
-void relief_multidirectional(const ReliefRows& rows, const PixelSize& pixel, double elevation_deg,
-                             std::span<float> out) {
-  const Normal sun = towards_sun(90.0, elevation_deg);
-  vectorised<multidirectional>(rows.north, rows.here, rows.south, static_cast<int>(out.size()), per_x(pixel),
-                               per_z(pixel), sun.y, sun.x, out.data());
-}
-
-void relief_slope(const ReliefRows& rows, const PixelSize& pixel, std::span<float> out) {
-  for (int i = 0; i < static_cast<int>(out.size()); ++i) {
-    const Slope slope = slope_at(rows.north, rows.here, rows.south, i, per_x(pixel), per_z(pixel));
-    out[static_cast<std::size_t>(i)] = std::atan(std::sqrt(slope.x * slope.x + slope.z * slope.z)) * kDegrees;
-  }
-}
-
-void relief_aspect(const ReliefRows& rows, const PixelSize& pixel, std::span<float> out) {
-  for (int i = 0; i < static_cast<int>(out.size()); ++i) {
-    const Slope slope = slope_at(rows.north, rows.here, rows.south, i, per_x(pixel), per_z(pixel));
-    const float degrees = std::atan2(-slope.x, slope.z) * kDegrees;
-    const float clockwise = degrees < 0.0F ? degrees + 360.0F : degrees;
-    const bool is_level = slope.x == 0.0F && slope.z == 0.0F;
-    // -0 and what rounds to 360 are North.
-    const float north_is_0 = clockwise >= 360.0F ? 0.0F : clockwise + 0.0F;
-    out[static_cast<std::size_t>(i)] = is_level ? std::numeric_limits<float>::quiet_NaN() : north_is_0;
-  }
 }
 
 void relief_normals(const ReliefRows& rows, const PixelSize& pixel, std::span<float> out) {

@@ -24,14 +24,8 @@ struct PixelSize {
 /// A unit vector towards the sun: x East, y up, z South. azimuth clockwise from North.
 [[nodiscard]] Normal towards_sun(double azimuth_deg, double elevation_deg);
 
-/// Each writes one row; `out` holds the row's width. Shares are 0 to 1; NaN where the pixel is void.
+/// Writes one row; `out` holds the row's width. Shares are 0 to 1; NaN where the pixel is void.
 void relief_hillshade(const ReliefRows& rows, const PixelSize& pixel, const Normal& sun, std::span<float> out);
-void relief_multidirectional(const ReliefRows& rows, const PixelSize& pixel, double elevation_deg,
-                             std::span<float> out);
-/// Degrees; void where NaN.
-void relief_slope(const ReliefRows& rows, const PixelSize& pixel, std::span<float> out);
-/// Degrees clockwise from North; void also on level ground.
-void relief_aspect(const ReliefRows& rows, const PixelSize& pixel, std::span<float> out);
 /// Unit normals, [3 * width]: all x, all y, all z.
 void relief_normals(const ReliefRows& rows, const PixelSize& pixel, std::span<float> out);
 

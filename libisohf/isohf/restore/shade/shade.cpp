@@ -300,11 +300,6 @@ void require(const ShadeOptions& options, const GridSize& size) {
         "the shadow's softness must be above 0");
   check(options.elevation_units_per_world_unit > 0.0 && std::isfinite(options.elevation_units_per_world_unit),
         "the elevation units in one world unit must be above 0");
-  check(std::ranges::all_of(options.colours, [](const ColourStop& stop) { return std::isfinite(stop.elevation); }),
-        "the colours' elevations must be numbers");
-  check(std::is_sorted(options.colours.begin(), options.colours.end(),
-                       [](const ColourStop& a, const ColourStop& b) { return a.elevation < b.elevation; }),
-        "the colours must be ordered by rising elevation");
 }
 
 class ShadeRenderer {
@@ -325,7 +320,7 @@ class ShadeRenderer {
         width_(static_cast<std::size_t>(size.first)),
         grid_(archive.metadata().plane_grid(plane_)),
         columns_(grid_, x_),
-        palette_(request.colours.empty() ? shade_colours(archive.metadata(), request.palette) : request.colours),
+        palette_(shade_colours(archive.metadata(), request.palette)),
         illumination_(request.sun_azimuth_deg, request.sun_elevation_deg, request.relief, has_air(archive.metadata())),
         sun_(towards_sun(request.sun_azimuth_deg, request.sun_elevation_deg)),
         datum_(archive.metadata().statistics.min.value_or(0.0)),
@@ -778,15 +773,6 @@ class ShadeRenderer {
       case ShadeKind::kHillshade:
         relief_hillshade(rows, pixel, sun_, one);
         break;
-      case ShadeKind::kMultidirectional:
-        relief_multidirectional(rows, pixel, request_.sun_elevation_deg, one);
-        break;
-      case ShadeKind::kSlope:
-        relief_slope(rows, pixel, one);
-        break;
-      case ShadeKind::kAspect:
-        relief_aspect(rows, pixel, one);
-        break;
       case ShadeKind::kShadowMask:
         std::copy_n(pixels.shares.begin() + block.first, count, one.begin());
         break;
@@ -798,9 +784,7 @@ class ShadeRenderer {
     if (samples_.type == SampleType::kUint8) {
       return bytes_from_shares(one, {reinterpret_cast<std::uint8_t*>(out), count});
     }
-    const bool is_share = !std::isfinite(*samples_.void_value);
-    auto* const floats = static_cast<float*>(static_cast<void*>(out));
-    for (std::size_t i = 0; i < count; ++i) floats[i] = std::isnan(one[i]) && !is_share ? kShadeVoid : one[i];
+    std::copy(one.begin(), one.end(), static_cast<float*>(static_cast<void*>(out)));
   }
 
   void colour_row(const PixelRow& pixels, const Run& block, const std::vector<float>& normals, std::byte* out) const {
@@ -871,9 +855,6 @@ class ShadeRenderer {
 
 ShadeSamples shade_samples(const ShadeOptions& options) {
   const bool is_picture = options.kind == ShadeKind::kPicture;
-  if (options.kind == ShadeKind::kSlope || options.kind == ShadeKind::kAspect) {
-    return {SampleType::kFloat32, 1, static_cast<double>(kShadeVoid)};
-  }
   if (is_picture) return {options.floats ? SampleType::kFloat32 : SampleType::kUint8, 4, std::nullopt};
   if (options.floats) return {SampleType::kFloat32, 1, std::numeric_limits<double>::quiet_NaN()};
   return {SampleType::kUint8, 1, 0.0};
@@ -911,7 +892,7 @@ ShadeReport shade_rows(const ArchiveReader& archive, const ShadeOptions& options
 Picture shade(const ArchiveReader& archive, const ShadeOptions& options, const Job& job) {
   const ShadeSamples samples = shade_samples(options);
   if (samples.type != SampleType::kUint8) {
-    throw Error(ErrorCode::kInvalidArgument, "shade: a Picture holds bytes, not slopes, aspects or floats");
+    throw Error(ErrorCode::kInvalidArgument, "shade: a Picture holds bytes, not floats");
   }
   const GridSize size = options.size.value_or(shade_size(archive));
   require(options, size);
