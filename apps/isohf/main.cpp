@@ -38,8 +38,6 @@ constexpr Command kCommands[] = {
     {"scan", "Find the range of elevations for a plan of many machines", command_scan},
     {"view", "Fly over an archive in a window, or draw it without one", command_view},
     {"formats", "List the formats that are read and written", command_formats},
-    {"experiment", "Measure iso and ortho meshes against sine waves, as the paper does",
-     [](const Arguments& arguments) -> int { become_program("isohf-experiment", arguments); }, true},
 };
 
 constexpr const char* kSummary =

@@ -9,7 +9,7 @@ ISOHF_PACKAGES_BUILD=(
   "${ISOHF_PACKAGES_LEAN[@]}" libopenimageio-dev libproj-dev libnetcdf-dev
   libepoxy-dev libglfw3-dev libegl-dev libgl-dev libegl1 libgl1-mesa-dri
   libgtest-dev libgmock-dev libbenchmark-dev
-  gnuplot-nox unzip zip xvfb xauth xdotool python3-jsonschema)
+  unzip zip xvfb xauth xdotool python3-jsonschema)
 ISOHF_PACKAGES_CHECK=(clang-format-14 clang-tidy-14)
 ISOHF_PACKAGES_FUZZ=(clang-14 libclang-rt-14-dev)
 ISOHF_PACKAGES_BENCH=(gdal-bin time python3 python3-numpy openimageio-tools)

@@ -28,7 +28,7 @@ TESTDATA = HERE.parent.parent / "testdata"
 RASTERS = {"coast.tif": "coast_512x384_int16.tif", "voids.tif": "voids_200x150_int16.tif",
            "ridges.exr": "ridges_161x161_float.exr", "peaks.png": "peaks_256x256_uint16.png"}
 MASKS = [(r"\b\d+(\.\d+)? (ms|s)\b", "<s>"),
-         (r"\b(isohf|isohf-view|isohf-experiment|libtiff|libpng|OpenEXR|OpenImageIO|zlib|PROJ) \d+(\.\d+)+", r"\1 <version>"),
+         (r"\b(isohf|isohf-view|libtiff|libpng|OpenEXR|OpenImageIO|zlib|PROJ) \d+(\.\d+)+", r"\1 <version>"),
          (r"[0-9.]+ million input samples a second", "<rate>"),
          (r"\b\d+(\.\d+)? (bytes|kB|MB|GB)\b(?! as raw| take| of)", "<size>"),
          (r"[0-9.]+ bits a source sample: [0-9.]+ times", "<ratio>"),

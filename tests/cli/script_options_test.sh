@@ -10,12 +10,10 @@ expect() {  # expect CODE SCRIPT ARGUMENT...
   found=$?
   ((found == code)) || { echo "$*: ended with $found, must be $code"; failed=1; }
 }
-for script in scripts/{accuracy_table,bench,check,quickstart,test} scripts/dev/{faults,fuzz,soak,tsan} testdata/make_testdata; do
+for script in scripts/{bench,check,quickstart,test} scripts/dev/{faults,fuzz,soak,tsan} testdata/make_testdata; do
   expect 0 "$script" --help
   [[ $script == scripts/test ]] || expect 2 "$script" --nonsense
 done
-expect 2 scripts/accuracy_table --data
-expect 2 scripts/accuracy_table --quick
 expect 2 scripts/bench nonsense
 expect 2 scripts/bench --rounds 0
 expect 2 scripts/check --fix --nonsense

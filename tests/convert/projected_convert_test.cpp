@@ -194,7 +194,7 @@ TEST(ProjectedArchive, PassesEveryCheckAgainstItsSource) {
       const VertexReport vertices = check_vertices(archive, source);
       EXPECT_EQ(vertices.wrong, 0);
       EXPECT_GT(vertices.vertices, 10000);
-      const AccuracyReport accuracy = compare_with_source(archive, source, {}, 2000);
+      const AccuracyReport accuracy = compare_with_source(archive, source);
       EXPECT_EQ(accuracy.samples, 240 * 150);
       EXPECT_EQ(accuracy.samples_void, 40);
       EXPECT_EQ(accuracy.lost_inside, 0);

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "isohf/error.h"
 #include "reconstruction_error.h"
 
 namespace isohf::experiment {
@@ -31,8 +30,6 @@ TEST(TestMesh, EveryVertexInsideStandsForAnAreaOfOne) {
       EXPECT_GE(measured, 50);
     }
   }
-  EXPECT_THROW((void)make_iso_mesh(499), Error);
-  EXPECT_THROW((void)make_ortho_mesh(1'000'001, Diagonals::kBoth), Error);
 }
 
 TEST(TestMesh, LooksTheSameAfterHalfATurn) {
@@ -66,18 +63,6 @@ TEST(TriangleRule, IntegratesPolynomialsOfDegreeFive) {
   EXPECT_EQ(slope_rule().size(), kSlopePoints);
 }
 
-// The heights of the gradient method are those of a factorisation; tolerance: a residual of 1e-10 times the condition.
-TEST(HeightFit, ConjugateGradientsAgreeWithCholesky) {
-  for (const TestMesh& mesh : all_meshes(1000)) {
-    const HeightFit fit(mesh);
-    for (const SineWave& wave : {SineWave{0.3, 0.02}, SineWave{1.1, 0.31}, SineWave{2.5, 0.5}}) {
-      const ComplexHeights a = fit.fit(wave);
-      const ComplexHeights b = fit.fit_directly(wave);
-      for (std::size_t i = 0; i < a.size(); ++i) EXPECT_LT(std::abs(a[i] - b[i]), 1e-8);
-    }
-  }
-}
-
 // No other heights are better: the error is at its least where moving any vertex either way makes it worse.
 TEST(HeightFit, BeatsInterpolation) {
   const SineWave wave = {0.7, 0.2};
@@ -86,14 +71,14 @@ TEST(HeightFit, BeatsInterpolation) {
     const ComplexHeights fitted = HeightFit(mesh).fit(wave);
     TestMesh whole = mesh;
     for (MeshTriangle& t : whole.triangles) t.is_measured = true;
-    const ErrorMeter meter(whole, wave, 1.0, {});
+    const ErrorMeter meter(whole, wave, 1.0);
     const std::vector<bool> all(whole.triangles.size(), true);
     const auto squared = [&](const ComplexHeights& heights) {
       std::vector<double> phase_0;
       for (const std::complex<double>& y : heights) phase_0.push_back(y.imag());
       ErrorSums sums;
-      meter.add(all, 1.0, exact, phase_0, sums);
-      return sums.elevation_squared;
+      meter.add(all, exact, phase_0, sums);
+      return sums.sums[kRms];
     };
     const double least = squared(fitted);
     EXPECT_LT(least, 0.5 * squared(exact));
@@ -108,15 +93,14 @@ TEST(HeightFit, BeatsInterpolation) {
 }
 
 // Crests along a diagonal: every square on a slope takes the diagonal that lies along the crest.
-TEST(DiagonalFit, TakesTheDiagonalsAlongTheCrests) {
+TEST(FitDiagonals, TakeTheDiagonalsAlongTheCrests) {
   const TestMesh mesh = make_ortho_mesh(1000, Diagonals::kBoth);
-  const DiagonalFit fit(mesh);
   for (const bool along_consistent : {true, false}) {
     const SineWave wave = {(along_consistent ? 0.75 : 0.25) * std::numbers::pi, 0.05};
     const ComplexHeights exact = wave_at_vertices(wave, mesh);
     std::vector<double> heights;
     for (const std::complex<double>& y : exact) heights.push_back(y.imag());
-    const DiagonalChoice choice = fit.fit(wave_on_shapes(wave, mesh), exact, 0.0, heights, true);
+    const DiagonalChoice choice = fit_diagonals(mesh, wave_on_shapes(wave, mesh), exact, heights, true);
     int other = 0;
     for (const std::uint8_t takes_other : choice.takes_other) other += takes_other;
     const double share = other / static_cast<double>(choice.takes_other.size());

@@ -327,7 +327,7 @@ void CommandLine::State::check_entries(const std::vector<ConfigEntry>& entries) 
                                     [&](const Command& known) { return entry.section == known.name; });
     const bool is_own = entry.section == command;
     // A program of one command knows nothing of the others'.
-    if ((all_commands.empty() && !is_own) || (other != all_commands.end() && other->is_program)) continue;
+    if (all_commands.empty() && !is_own) continue;
     if (!entry.section.empty() && !is_own && other == all_commands.end()) {
       std::vector<std::string> names;
       for (const Command& known : all_commands) names.emplace_back(known.name);
@@ -588,7 +588,6 @@ void CommandLine::fail(const std::string& why) const {
 
 std::vector<DeclaredOption> options_of(const Command& command) {
   std::vector<DeclaredOption> found;
-  if (command.is_program) return found;
   std::vector<DeclaredOption>* const before = std::exchange(declared, &found);
   try {
     command.run({});

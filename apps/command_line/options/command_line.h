@@ -16,7 +16,6 @@ struct Command {
   const char* name;
   const char* summary;
   int (*run)(const Arguments& arguments);  ///< parses, which touches no file but --config, and runs. Throws Error
-  bool is_program = false;                 ///< run() becomes a program of its own, whose options are not known here
 };
 
 /// The command line of one command: its options, its help, and the parsing of both.

@@ -368,7 +368,7 @@ int run(ConvertCommandOptions options) {
   std::optional<Accuracy> accuracy;
   if (options.report) {
     options.convert.measure = [&](const std::string& archive) {
-      accuracy = measure_accuracy(archive, source, kRandomPoints, true, job);
+      accuracy = measure_accuracy(archive, source, job);
       return accuracy->surface;
     };
   }

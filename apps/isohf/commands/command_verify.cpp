@@ -11,7 +11,6 @@
 
 #include "commands/command.h"
 #include "formats/georeference/reference_system.h"
-#include "isohf/archive/metadata/part_record.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "isohf/surface.h"
@@ -54,10 +53,8 @@ struct VerifyCommandOptions {
   OpenOptions open;
   GeoidRequest geoid;
   bool geoid_is_recorded = false;  ///< its path is a name without a folder
-  std::int64_t random_points = kRandomPoints;
   std::optional<double> max_error;
   std::optional<double> max_rms;
-  bool ortho = false;
   bool list_checks = false;
 };
 
@@ -77,14 +74,6 @@ std::optional<VerifyCommandOptions> parse_verify(const Arguments& arguments, con
       "Measure the surface against the raster it was made from; a folder, \"pattern*\" or @list, or again and "
       "again, for a mosaic",
       options.against.names);
-  line.option("--random", "N", "Random places to compare beside the input's samples (default 100000)",
-              [&](const std::string& text) { options.random_points = parse_whole_number(text, 0, 1000000000); });
-  line.flag("--ortho",
-            "Measure ortho meshes of as many vertices, and of as small an error, as well; takes five times as long",
-            options.ortho);
-  bool without_ortho = false;
-  line.flag("--no-ortho", "The default; kept for scripts of before there was --ortho", without_ortho);
-  line.exclusive({"--ortho", "--no-ortho"});
   const auto limit = [](std::optional<double>& value) {
     return [&value](const std::string& text) {
       double found = 0.0;
@@ -294,10 +283,6 @@ int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_
       options = *parse_verify(arguments, *metadata.source.options);
       options.archive = archive.path();
     }
-    if (options.ortho && part_record(metadata)) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  "verify: --ortho lays meshes over a whole archive, " + archive.path() + " is a part of one");
-    }
     const std::unique_ptr<HeightSource> source = open_as_recorded(options, metadata);
     const SourceInfo& info = source->info();
     const auto same_system = are_same(source_georeference(metadata.source).system, info.georeference.system);
@@ -305,7 +290,7 @@ int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_
       display->clear();
       print_warning(warning);
     }
-    accuracy = measure_accuracy(options.archive, *source, options.random_points, options.ortho, job);
+    accuracy = measure_accuracy(options.archive, *source, job);
     add_findings(*accuracy, contradiction(metadata, accuracy->surface), report);
   }
   display.reset();

@@ -192,8 +192,7 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments, C
   line.group("Report");
   line.option_or_value(
       "--report", "[FILE.json|-]", "-", [](const std::string& text) { return text == "-" || text.ends_with(".json"); },
-      "Measure the archive against INPUT afterwards, and ortho meshes beside it; print it with the summary, and write "
-      "it to FILE.json as well",
+      "Measure the archive against INPUT afterwards; print it with the summary, and write it to FILE.json as well",
       [&](const std::string& text) { options.report = text; });
   add_work_options(line, options.work);
   add_memory_options(line, "OUTPUT's folder", options.work);

@@ -6,23 +6,17 @@
 
 #include "isohf/convert.h"
 #include "isohf/verify.h"
-#include "isohf/verify/accuracy/lattice_report.h"
 
 namespace isohf::cli {
-
-/// Random places to compare beside the samples where nothing else is asked for.
-inline constexpr std::int64_t kRandomPoints = 100000;
 
 /// What convert --report and verify --against measure and print.
 struct Accuracy {
   VertexReport vertices;
   AccuracyReport surface;
-  std::optional<LatticeReport> lattice;  ///< nullopt where it was not asked for
 };
 
 /// Opens the archive; the source is the one that it was made from.
-[[nodiscard]] Accuracy measure_accuracy(const std::string& archive, HeightSource& source, std::int64_t random_points,
-                                        bool with_ortho, const Job& job);
+[[nodiscard]] Accuracy measure_accuracy(const std::string& archive, HeightSource& source, const Job& job);
 
 /// "rms 4.7, largest 61 over 1,442,401 samples".
 [[nodiscard]] std::string describe_accuracy(const AccuracyInfo& info, const std::string& unit);

@@ -67,20 +67,17 @@ struct AccuracyReport {
   std::int64_t invented_inside = 0;   ///< of these, with nothing but voids within reach of a triangle
   double rms = 0.0;                   ///< vertical units
   double max = 0.0;
-  double p99 = 0.0;                ///< 99th percentile of the absolute error, to 1.1 %, rounded up
-  double psnr_db = 0.0;            ///< 20 log10(elevation range / rms); infinite where rms is 0
-  WorldPoint worst{};              ///< where the largest error lies
-  std::int64_t random_points = 0;  ///< random places compared with bilinear interpolation of the source
-  double random_rms = 0.0;
-  double random_max = 0.0;
+  double p99 = 0.0;              ///< 99th percentile of the absolute error, to 1.1 %, rounded up
+  double psnr_db = 0.0;          ///< 20 log10(elevation range / rms); infinite where rms is 0
+  WorldPoint worst{};            ///< where the largest error lies
   std::vector<ErrorPeak> peaks;  ///< the largest of all rows, 256 at most
 };
 
-/// Compares at every source sample and at `random_points` random positions (fixed seed). Streams both sides: memory is
-/// bounded by two rows of tiles and a band of source rows. Stage "compare". Throws Error{kInvalidArgument} where the
-/// source's size or georeference does not match the archive's record of it.
+/// Compares at every source sample. Streams both sides: memory is bounded by two rows of tiles and a band of source
+/// rows. Stage "compare". Throws Error{kInvalidArgument} where the source's size or georeference does not match the
+/// archive's record of it.
 [[nodiscard]] AccuracyReport compare_with_source(const ArchiveReader& archive, HeightSource& source,
-                                                 const Job& job = {}, std::int64_t random_points = 0);
+                                                 const Job& job = {});
 
 /// What contradicts the error that the archive's metadata state; empty where they state none, or just that.
 [[nodiscard]] std::string contradiction(const Metadata& metadata, const AccuracyReport& found);

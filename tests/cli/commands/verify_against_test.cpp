@@ -216,9 +216,6 @@ TEST_F(VerifyAgainst, OfAPartOnlyItsOwnGroundIsCompared) {
     write_degrees(folder / "other", kColumns, kRows, 5.0, 44.0, 0.01, [](double, double) { return 400.0; });
     EXPECT_EQ(run_isohf({"verify", part, "--against", folder / "other.flt"}).exit_code, 3);
   }
-  const RunResult ortho = run_isohf({"verify", part, "--against", folder / "land.flt", "--ortho"});
-  EXPECT_EQ(ortho.exit_code, 2);
-  EXPECT_THAT(ortho.err, HasSubstr("part.isohf is a part of one"));
 }
 
 TEST_F(VerifyAgainst, TakesWhatWasCutFromACoarsePlane) {

@@ -37,8 +37,8 @@ class MaxError : public testing::Test {
     return run_isohf(arguments);
   }
   json against() {
-    const RunResult result = run_isohf(
-        {"verify", folder / "a.isohf", "--against", folder / "a.tif", "--nodata=-32768", "--no-ortho", "--json"});
+    const RunResult result =
+        run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--nodata=-32768", "--json"});
     EXPECT_EQ(result.exit_code, 0) << result.out;
     return json::parse(result.out).at("against");
   }
@@ -129,7 +129,7 @@ TEST_F(MaxError, InfoPrintsWhatWasMeasuredAndVerifyFindsWhatIsNotTrue) {
   // Of another input of the same size nothing that is stated holds.
   write_int16_tiff(folder / "b.tif", 300, 200,
                    [](std::int64_t c, std::int64_t) { return static_cast<std::int16_t>(c); });
-  const RunResult other = run_isohf({"verify", folder / "a.isohf", "--against", folder / "b.tif", "--no-ortho"});
+  const RunResult other = run_isohf({"verify", folder / "a.isohf", "--against", folder / "b.tif"});
   EXPECT_EQ(other.exit_code, 3);
   EXPECT_THAT(other.out, HasSubstr("ISOHF-0025 error: the metadata state an error of rms"));
 }

@@ -16,8 +16,8 @@ namespace {
 
 using testing::HasSubstr;
 
-const std::vector<std::string> kCommands = {"plan",   "convert", "info", "verify",  "restore",   "export",
-                                            "sample", "shade",   "view", "formats", "experiment"};
+const std::vector<std::string> kCommands = {"plan",   "convert", "info",  "verify", "restore",
+                                            "export", "sample",  "shade", "view",   "formats"};
 
 std::set<std::string> long_options_in(const std::string& text) {
   std::set<std::string> found;
@@ -135,7 +135,6 @@ TEST(Usage, BashCompletesEveryCommandOptionAndWord) {
   }
   EXPECT_EQ(completions_of(" restore --method h", 3), "hex\n");
   EXPECT_EQ(completions_of(" shade --palette g", 3), "gray\n");
-  EXPECT_EQ(completions_of(" experiment --fit i", 3), "interpolate\n");
   // Of convert and plan it is a flag.
   EXPECT_EQ(completions_of(" convert --fit interpol", 3), "\n");
 }

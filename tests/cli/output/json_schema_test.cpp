@@ -162,8 +162,6 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(1, "sample-line", {"sample", a}, places);
   documents.run(0, "shade", {"shade", a, "-o", folder / "s.png", "--progress", "json"});
   documents.run(2, "error", {"shade", a});
-  documents.run(0, "experiment", {"experiment", "--quick", "--triangles", "1000", "-o", folder / "figures"});
-  documents.run(2, "error", {"experiment", "--triangles", "5"});
   documents.run(0, "formats", {"formats"});
   documents.run(0, "program", {"--version"});
   documents.run(0, "program", {"--help"});

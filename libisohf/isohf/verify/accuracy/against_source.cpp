@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <random>
 #include <span>
 #include <utility>
 #include <vector>
@@ -36,14 +35,6 @@ struct Sums {
   ErrorSums errors;
   std::int64_t worst_column = 0;
   std::int64_t visited = 0;
-};
-
-/// A random place in source columns and rows.
-struct Place {
-  double u;
-  double v;
-  WorldPoint world;
-  std::int64_t tile_row;
 };
 
 /// Source samples that are looked at together: either side of a square.
@@ -78,7 +69,7 @@ constexpr std::int64_t kSamplesAtOnce = std::int64_t{1} << 20U;
 
 class Comparison {
  public:
-  Comparison(const ArchiveReader& archive, HeightSource& source, std::int64_t random_points)
+  Comparison(const ArchiveReader& archive, HeightSource& source)
       : archive_(archive),
         grid_(archive.grid()),
         record_(archive.metadata().source),
@@ -95,7 +86,6 @@ class Comparison {
     if (is_warped(archive.metadata())) warp_.emplace(*archive_geometry(archive.metadata()).warp);
     rows_at_once_ =
         std::max<std::int64_t>(kSamplesAtOnce / info_.width, 2 * oneapi::tbb::this_task_arena::max_concurrency());
-    draw_points(random_points);
   }
 
   AccuracyReport run(const Job& job) {
@@ -104,9 +94,8 @@ class Comparison {
     BandReader reader(source_, datum_, samples_as_they_are);
     AccuracyReport report;
     ErrorSums errors;
-    double random_squares = 0.0;
     std::int64_t first_row = 0;
-    if (warp_) run_warped(reader, report, errors, random_squares, job);
+    if (warp_) run_warped(reader, report, errors, job);
     VertexRows tiles(grid_, archive_.metadata().quantisation, tiles_of(archive_), 0, grid_.tile_columns() - 1, scratch);
     for (std::int64_t tile_row = 0; !warp_ && tile_row < grid_.tile_rows() && first_row < info_.height; ++tile_row) {
       const std::int64_t end_row = rows_until(tile_row);
@@ -115,14 +104,12 @@ class Comparison {
         tiles.drop_before(tile_row);
         tiles.have(tile_row);
       }
-      for (const std::int64_t first_of_tiles = first_row; first_row < end_row;) {
+      while (first_row < end_row) {
         job.throw_if_cancelled();
         const std::int64_t end = std::min(first_row + rows_at_once_, end_row);
         const auto band =
             reader.read({std::max<std::int64_t>(first_row - reach_, 0), std::min(end + reach_, info_.height) - 1});
-        const RowSurface surface{tiles, tile_row};
-        compare_rows(surface, *band, first_row, end, report, errors);
-        compare_points(surface, *band, first_of_tiles, end, end == end_row, report, random_squares);
+        compare_rows(RowSurface{tiles, tile_row}, *band, first_row, end, report, errors);
         first_row = end;
       }
       job.report({"compare", "rows", tile_row + 1, grid_.tile_rows()});
@@ -132,8 +119,6 @@ class Comparison {
     report.rms = errors.rms();
     report.max = errors.max;
     report.worst = errors.worst;
-    if (report.random_points > 0)
-      report.random_rms = std::sqrt(random_squares / static_cast<double>(report.random_points));
     report.psnr_db = psnr_db(span_, report.rms);
     ErrorHistogram histogram;
     for (const ErrorHistogram& part : histograms_) histogram.add(part);
@@ -168,7 +153,7 @@ class Comparison {
     }
     const double bytes = reading_bytes(job, static_cast<double>(grid_.shape().stored_vertex_count())) +
                          static_cast<double>(source_.buffer_bytes(kBufferBytes)) + 2.0 * kBufferBytes +
-                         rows * width * 10.0 + static_cast<double>(points_.size() * sizeof(Place)) +
+                         rows * width * 10.0 +
                          threads_of(job) * 8.0 * static_cast<double>(grid_.tile_columns() * grid_.shape().columns()) +
                          (warp_ ? 2.0 * tiles : 0.0);
     return scratch_for(job, bytes + tiles, bytes, "comparing");
@@ -181,8 +166,7 @@ class Comparison {
   }
 
   /// The source was projected: each sample has a place of its own, and is compared with the tile row that it lies on.
-  void run_warped(BandReader& reader, AccuracyReport& report, ErrorSums& errors, double& random_squares,
-                  const Job& job) {
+  void run_warped(BandReader& reader, AccuracyReport& report, ErrorSums& errors, const Job& job) {
     const std::vector<SourceWarp::RowBounds> all = SourceWarp(grid_, warp_->place(), 0.0).reading_bounds();
     visited_ = 0;
     for (std::int64_t tile_row = 0; tile_row < grid_.tile_rows(); ++tile_row) {
@@ -194,11 +178,7 @@ class Comparison {
         const auto end_row = static_cast<std::int64_t>(std::min(std::ceil(bounds.most), last)) + 1;
         const auto band = reader.read(
             {std::max<std::int64_t>(first_row - kMostReach, 0), std::min(end_row + kMostReach, info_.height) - 1});
-        const TileRowSurface surface = decode(tile_row);
-        compare_rows(surface, *band, first_row, end_row, report, errors);
-        for (; next_point_ < points_.size() && points_[next_point_].tile_row <= tile_row; ++next_point_) {
-          compare_point(surface, *band, points_[next_point_], report, random_squares);
-        }
+        compare_rows(decode(tile_row), *band, first_row, end_row, report, errors);
       }
       job.report({"compare", "rows", tile_row + 1, grid_.tile_rows()});
     }
@@ -231,14 +211,6 @@ class Comparison {
     if (at.tile.row < tile_row) at.point.z = 0.0;
     at.point = {snapped(at.point.x), snapped(at.point.z)};
     return at;
-  }
-
-  /// Of a point anywhere.
-  [[nodiscard]] double elevation_at(const RowSurface& surface, WorldPoint world) const {
-    const TilePoint at = locate(surface.tile_row, world);
-    const TriangleRows vertices(surface.tiles, grid_.shape(), surface.tile_row, at.point.z, at.tile.column, 1);
-    return vertices.elevation(archive_.metadata().quantisation, at.tile.column,
-                              snapped(barycentric(grid_.shape(), at.point)));
   }
 
   [[nodiscard]] double elevation_at(const TileRowSurface& surface, WorldPoint world) const {
@@ -411,56 +383,6 @@ class Comparison {
     ++(void_in_source ? counts.invented_inside : counts.lost_inside);
   }
 
-  /// Fixed seed, sorted from North to South.
-  void draw_points(std::int64_t count) {
-    std::mt19937_64 random(20040808);
-    const auto uniform = [&](double end) { return static_cast<double>(random() >> 11U) * 0x1p-53 * end; };
-    points_.reserve(static_cast<std::size_t>(count));
-    for (std::int64_t i = 0; i < count; ++i) {
-      const double u = uniform(static_cast<double>(info_.width - 1));
-      const double v = uniform(static_cast<double>(info_.height - 1));
-      const WorldPoint world = warp_ ? warp_->world_from_source({u, v}) : WorldPoint{world_x(u), world_z(v)};
-      points_.push_back({u, v, world, warp_ ? tile_row_at(world) : 0});
-    }
-    std::sort(points_.begin(), points_.end(), [](const Place& a, const Place& b) {
-      return a.tile_row != b.tile_row ? a.tile_row < b.tile_row : a.v < b.v;
-    });
-  }
-
-  /// Points whose place lies in this tile row, which begins at source row `first`, and before row `end`: in the tile
-  /// row's last rows their source row is in [first - 1, end).
-  void compare_points(const RowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,
-                      bool ends_tile_row, AccuracyReport& report, double& squares) {
-    const bool last = end == info_.height;
-    for (; next_point_ < points_.size(); ++next_point_) {
-      const Place& place = points_[next_point_];
-      if (!last && place.v > static_cast<double>(ends_tile_row ? end - 1 : end)) break;
-      if (first > 0 && place.v < static_cast<double>(first)) continue;  // between the last row and the edge
-      compare_point(surface, band, place, report, squares);
-    }
-  }
-
-  template <typename Surface>
-  void compare_point(const Surface& surface, const Band& band, const Place& place, AccuracyReport& report,
-                     double& squares) const {
-    const auto i = static_cast<std::int64_t>(place.u);
-    const auto j = static_cast<std::int64_t>(place.v);
-    const View2D<const float> heights = band.view().heights;
-    const auto h = [&](std::int64_t c, std::int64_t r) {
-      return double{heights(std::min(c, info_.width - 1), std::min(r, info_.height - 1) - band.rows.first)};
-    };
-    const double u = place.u - static_cast<double>(i);
-    const double v = place.v - static_cast<double>(j);
-    const double expected =
-        (1 - v) * ((1 - u) * h(i, j) + u * h(i + 1, j)) + v * ((1 - u) * h(i, j + 1) + u * h(i + 1, j + 1));
-    const double stored = elevation_at(surface, place.world);
-    if (std::isnan(expected) || std::isnan(stored)) return;
-    const double error = std::abs(stored - expected - datum_);
-    ++report.random_points;
-    squares += error * error;
-    report.random_max = std::max(report.random_max, error);
-  }
-
   const ArchiveReader& archive_;
   const TileGrid& grid_;
   const SourceRecord& record_;
@@ -473,22 +395,14 @@ class Comparison {
   std::int64_t rows_at_once_ = 1;  ///< that are compared, where samples lie in rows
   std::optional<ExactWarp> warp_;  ///< where the source was projected
   std::int64_t visited_ = 0;
-  std::vector<Place> points_;  ///< from North to South
-  std::size_t next_point_ = 0;
   oneapi::tbb::enumerable_thread_specific<ErrorHistogram> histograms_;
 };
 
 }  // namespace
 
-AccuracyReport compare_with_source(const ArchiveReader& archive, HeightSource& source, const Job& job,
-                                   std::int64_t random_points) {
-  constexpr std::int64_t kMostPoints = 1'000'000'000;
-  if (random_points < 0 || random_points > kMostPoints) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{} random places are asked for, must be 0 to {}", random_points, kMostPoints));
-  }
+AccuracyReport compare_with_source(const ArchiveReader& archive, HeightSource& source, const Job& job) {
   AccuracyReport report;
-  Arena(job).execute([&] { report = Comparison(archive, source, random_points).run(job); });
+  Arena(job).execute([&] { report = Comparison(archive, source).run(job); });
   return report;
 }
 

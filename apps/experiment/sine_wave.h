@@ -36,10 +36,8 @@ inline constexpr std::size_t kSlopePoints = 7;       ///< triangle_rule(1)
 
 /// exp(i k·o) for the points o of a triangle seen from its first vertex: what translates of the triangle share.
 struct WaveOnShape {
-  std::array<double, kElevationPoints> elevation_re;
-  std::array<double, kElevationPoints> elevation_im;
-  std::array<double, kSlopePoints> slope_re;
-  std::array<double, kSlopePoints> slope_im;
+  std::array<std::complex<double>, kElevationPoints> elevation;
+  std::array<std::complex<double>, kSlopePoints> slope;
   /// Integral of exp(i k·o) times the hat function of each vertex, by 448 points: relative error below 1e-9 up to half
   /// a cycle per sample.
   std::array<std::complex<double>, 3> load;

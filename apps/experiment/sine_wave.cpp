@@ -68,15 +68,9 @@ std::vector<WaveOnShape> wave_on_shapes(const SineWave& wave, const TestMesh& me
   for (const TriangleShape& shape : mesh.shapes) {
     WaveOnShape on = {};
     for (std::size_t i = 0; i < kElevationPoints; ++i) {
-      const double turn = turn_at(k, shape, elevation_rule()[i]);
-      on.elevation_re[i] = std::cos(turn);
-      on.elevation_im[i] = std::sin(turn);
+      on.elevation[i] = std::polar(1.0, turn_at(k, shape, elevation_rule()[i]));
     }
-    for (std::size_t i = 0; i < kSlopePoints; ++i) {
-      const double turn = turn_at(k, shape, slope_rule()[i]);
-      on.slope_re[i] = std::cos(turn);
-      on.slope_im[i] = std::sin(turn);
-    }
+    for (std::size_t i = 0; i < kSlopePoints; ++i) on.slope[i] = std::polar(1.0, turn_at(k, shape, slope_rule()[i]));
     for (const RulePoint& point : load_rule) {
       const double part = 0.5 * shape.doubled_area() * point.weight;
       const std::complex<double> value = std::polar(part, turn_at(k, shape, point));

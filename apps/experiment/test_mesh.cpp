@@ -1,21 +1,15 @@
 #include "test_mesh.h"
 
-#include <fmt/format.h>
-
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <utility>
 
-#include "isohf/error.h"
 #include "isohf/lattice.h"
 #include "isohf/lattice/strip.h"
 
 namespace isohf::experiment {
 namespace {
-
-constexpr std::int64_t kFewestTriangles = 500;
-constexpr std::int64_t kMostTriangles = 1'000'000;
 
 struct IntegerPlace {
   int x;
@@ -62,16 +56,9 @@ class MeshBuilder {
   TestMesh mesh_;
 };
 
-void require_count(std::int64_t triangles) {
-  if (triangles >= kFewestTriangles && triangles <= kMostTriangles) return;
-  throw Error(ErrorCode::kInvalidArgument, fmt::format("found a mesh of {} triangles, must be {} to {}", triangles,
-                                                       kFewestTriangles, kMostTriangles));
-}
-
 }  // namespace
 
 TestMesh make_iso_mesh(std::int64_t triangles) {
-  require_count(triangles);
   const double side = std::sqrt(0.5 * static_cast<double>(triangles));
   // Base 2σx, height σz = √3 σx, area ½: two triangles a vertex.
   const double sigma_x = std::sqrt(0.5 / std::numbers::sqrt3);
@@ -99,7 +86,6 @@ TestMesh make_iso_mesh(std::int64_t triangles) {
 }
 
 TestMesh make_ortho_mesh(std::int64_t triangles, Diagonals diagonals) {
-  require_count(triangles);
   const int cells = static_cast<int>(std::lround(std::sqrt(0.5 * static_cast<double>(triangles))));
   MeshBuilder builder(cells, cells, {1.0, 1.0});
   for (int z = 0; z <= cells; ++z) {

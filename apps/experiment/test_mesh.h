@@ -46,12 +46,10 @@ struct TestMesh {
 /// height depends on what lies d samples away by about 0.3^d, so a cut edge is not seen from here.
 inline constexpr double kUnmeasuredMargin = 4.0;
 
-/// The full-detail mesh of a tile (paper section 3), stretched to equilateral triangles.
-/// triangles  wanted number, >= 500; the tile that is nearest to a square of that many is taken
-/// Throws Error{kInvalidArgument}.
+/// The full-detail mesh of the tile that is nearest to a square of `triangles`, stretched to equilateral triangles.
 [[nodiscard]] TestMesh make_iso_mesh(std::int64_t triangles);
 
-/// Squares cut along diagonals, as many as are nearest to `triangles` >= 500. Throws Error{kInvalidArgument}.
+/// Squares cut along diagonals, as many as are nearest to `triangles`.
 [[nodiscard]] TestMesh make_ortho_mesh(std::int64_t triangles, Diagonals diagonals);
 
 }  // namespace isohf::experiment
