@@ -28,8 +28,8 @@ _isohf() {
   fi
   local values=''
   case "$command $previous" in
-    *' --filter') values='nearest bilinear limited-cubic catmull-rom bspline2 bspline3 bspline5 lanczos3 lanczos6' ;;
-    *' --acquisition') values='point box tent gaussian: fir:' ;;
+    *' --filter') values='nearest bilinear limited-cubic bspline3' ;;
+    *' --acquisition') values='point box gaussian:' ;;
     *' --overlap') values='last first' ;;
     *' --outside') values='cover clamp void' ;;
     'export --type') values='u8 u16 i16 i32 f16 f32 f64' ;;

@@ -139,8 +139,7 @@ void heights_of_samples(benchmark::State& state) {
 }
 BENCHMARK(heights_of_samples)->Arg(0)->Arg(1)->ArgName("voids");
 
-constexpr Filter kFilters[] = {Filter::kNearest,  Filter::kBilinear, Filter::kCatmullRom, Filter::kBspline2,
-                               Filter::kBspline3, Filter::kBspline5, Filter::kLanczos3,   Filter::kLanczos6};
+constexpr Filter kFilters[] = {Filter::kNearest, Filter::kBilinear, Filter::kLimitedCubic, Filter::kBspline3};
 
 void prefilter_rows(benchmark::State& state) {
   const Prefilter prefilter = Prefilter::make(kFilters[state.range(0)], Acquisition{});
@@ -152,7 +151,7 @@ void prefilter_rows(benchmark::State& state) {
   set_bytes(state, band.size() * sizeof(float));
   state.SetLabel(to_string(kFilters[state.range(0)]));
 }
-BENCHMARK(prefilter_rows)->DenseRange(3, 5);
+BENCHMARK(prefilter_rows)->Arg(3);
 
 void prefilter_columns(benchmark::State& state) {
   const Prefilter prefilter = Prefilter::make(kFilters[state.range(0)], Acquisition{});
@@ -164,7 +163,7 @@ void prefilter_columns(benchmark::State& state) {
   set_bytes(state, out.size() * sizeof(float));
   state.SetLabel(to_string(kFilters[state.range(0)]));
 }
-BENCHMARK(prefilter_columns)->DenseRange(3, 5);
+BENCHMARK(prefilter_columns)->Arg(3);
 
 /// Row sampler and all: bytes of the heights that come out.
 void cut_tile(benchmark::State& state) {
@@ -178,7 +177,7 @@ void cut_tile(benchmark::State& state) {
   set_bytes(state, out.size() * sizeof(float));
   state.SetLabel(to_string(kFilters[state.range(0)]));
 }
-BENCHMARK(cut_tile)->DenseRange(0, 7);
+BENCHMARK(cut_tile)->DenseRange(0, 3);
 
 void quantise_tile(benchmark::State& state) {
   TileCodes codes;

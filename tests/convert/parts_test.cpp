@@ -311,7 +311,7 @@ TEST_F(Shards, OfALosslessConversionJoinToItsBytes) {
 TEST_F(Shards, ScansOfRowsMakeThePlanOfOnePass) {
   options.z_range.reset();
   for (const auto& [type, filter] :
-       {std::pair(CodeType::kU16, Filter::kBilinear), std::pair(CodeType::kF32, Filter::kLanczos3),
+       {std::pair(CodeType::kU16, Filter::kBilinear), std::pair(CodeType::kF32, Filter::kBspline3),
         std::pair(CodeType::kU8, Filter::kLimitedCubic)}) {
     options.code_type = type;
     options.filter = filter;
@@ -347,7 +347,7 @@ TEST_F(Shards, ScansOfRowsMakeThePlanOfOnePass) {
   options.z_range.reset();
   // What only the surface can tell.
   options.code_type = CodeType::kU16;
-  options.filter = Filter::kLanczos3;
+  options.filter = Filter::kBspline3;
   Hills source;
   const ShardPlan draft = draft_shards(source, options, 1);
   EXPECT_THAT(refusal([&] {

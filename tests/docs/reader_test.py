@@ -32,7 +32,7 @@ def cases(folder):
     yield VOIDS, ["--projection", "local", "--type", "f32"]
     yield VOIDS, ["--projection", "utm", "--max-error", "7"]
     yield RIDGES, ["--density", "0.4"]
-    yield RIDGES, ["--type", "f32", "--filter", "bspline5"]
+    yield RIDGES, ["--type", "f32", "--filter", "bspline3"]
     yield globe(folder), ["--wrap-x", "--shape", "12x11", "--levels", "2"]
 
 

@@ -23,6 +23,6 @@ offers --overwrite isohf convert --over
 offers --output isohf convert --o
 offers --density isohf convert in.tif --
 offers --against isohf verify --a
-offers bspline5 isohf convert --filter bs
+offers bspline3 isohf convert --filter bs
 cd "$(dirname "$1")"
 offers main.cpp isohf info main

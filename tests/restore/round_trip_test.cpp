@@ -33,12 +33,11 @@ TEST_P(RoundTripTest, OnTheLatticeThatHoldsTheSquareBandReachesTheReference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(RoundTrip, RoundTripTest,
-                         testing::Values(Mark{Filter::kBilinear, 46.1, 47.9}, Mark{Filter::kBspline3, 56.4, 67.6},
-                                         Mark{Filter::kBspline5, 60.3, 82.1}),
+                         testing::Values(Mark{Filter::kBilinear, 46.1, 47.9}, Mark{Filter::kBspline3, 56.4, 67.6}),
                          [](const auto& tested) { return to_string(tested.param.filter); });
 
 TEST(RoundTrip, TrianglesAloneLoseAllAboveTheLinear) {
-  EXPECT_LT(mean_psnr(Filter::kBspline5, 0.7, RestoreMethod::kBarycentric), 60.0);
+  EXPECT_LT(mean_psnr(Filter::kBspline3, 0.7, RestoreMethod::kBarycentric), 60.0);
 }
 
 }  // namespace

@@ -68,7 +68,7 @@ inline Place place_of(const Tiles& tiles, std::int64_t tile_column, std::int64_t
           static_cast<double>(tile_row) * tiles.extent_z + sigma_z * (row - 1)};
 }
 
-enum class Kernel { kNearest, kBilinear, kCubic, kLimitedCubic };
+enum class Kernel { kNearest, kBilinear, kLimitedCubic };
 
 /// The least and the greatest elevation that the filter may give at a place; two where rounding may fall either way.
 /// Voids are NaN on both sides; `is_known` false: this oracle has no answer.
@@ -84,7 +84,7 @@ inline double weight_of(Kernel kernel, double distance) {
   // Catmull-Rom: Keys 1981, a = -1/2. The limited cubic adds to a straight line 4/3 of what that adds (decision 27).
   const double cubic = d < 1.0 ? (1.5 * d - 2.5) * d * d + 1.0 : d < 2.0 ? ((-0.5 * d + 2.5) * d - 4.0) * d + 2.0 : 0.0;
   if (kernel == Kernel::kBilinear) return tent;
-  return kernel == Kernel::kCubic ? cubic : tent + (cubic - tent) * 4.0 / 3.0;
+  return tent + (cubic - tent) * 4.0 / 3.0;
 }
 
 /// At a column and row of the raster, fractional, within half a sample of it.

@@ -53,17 +53,14 @@ struct Fixture {
   }
 };
 
-constexpr Filter kFilters[] = {Filter::kNearest,    Filter::kBilinear, Filter::kLimitedCubic,
-                               Filter::kCatmullRom, Filter::kBspline2, Filter::kBspline3,
-                               Filter::kBspline5,   Filter::kLanczos3, Filter::kLanczos6};
+constexpr Filter kFilters[] = {Filter::kNearest, Filter::kBilinear, Filter::kLimitedCubic, Filter::kBspline3};
 
 float bumps(double x, double z) {
   return static_cast<float>(50.0 * std::sin(x * 0.03) + 30.0 * std::cos(z * 0.05 + x * 0.01));
 }
 
-/// Those that reproduce slopes; B-splines without their prefilter, which changes nothing on a plane.
-constexpr Filter kSlopes[] = {Filter::kBilinear, Filter::kLimitedCubic, Filter::kCatmullRom,
-                              Filter::kBspline2, Filter::kBspline3,     Filter::kBspline5};
+/// Those that reproduce slopes; the B-spline without its prefilter, which changes nothing on a plane.
+constexpr Filter kSlopes[] = {Filter::kBilinear, Filter::kLimitedCubic, Filter::kBspline3};
 
 TEST(GridResampler, ReproducesAPlaneToTheVeryEdgeOfTheSourceAndAsFarAsItGoesOn) {
   const auto plane = [](double x, double z) { return static_cast<float>(3.0 + 0.25 * x - 0.5 * z); };
@@ -157,7 +154,7 @@ TEST(GridResampler, LimitedCubicKeepsWaterFlatAtTheFootOfCliffs) {
   });
   std::map<Filter, std::int64_t> not_flat;
   std::int64_t cells = 0;
-  for (const Filter filter : {Filter::kLimitedCubic, Filter::kCatmullRom}) {
+  for (const Filter filter : {Filter::kLimitedCubic, Filter::kBspline3}) {
     for_each_vertex_inside(source, filter, [&](float height, WorldPoint, const std::vector<float>& around) {
       if (std::any_of(around.begin(), around.end(), [](float sample) { return sample != 12.34F; })) return;
       ++cells;
@@ -166,7 +163,7 @@ TEST(GridResampler, LimitedCubicKeepsWaterFlatAtTheFootOfCliffs) {
   }
   EXPECT_GT(cells, 500);
   EXPECT_EQ(not_flat[Filter::kLimitedCubic], 0);
-  EXPECT_GT(not_flat[Filter::kCatmullRom], 20) << "no cliff's foot is there to ring";
+  EXPECT_GT(not_flat[Filter::kBspline3], 20) << "no vertex has a cliff among its taps";
 }
 
 TEST(GridResampler, PlanesAreExactNextToVoidsBetweenFourSamples) {
@@ -177,13 +174,12 @@ TEST(GridResampler, PlanesAreExactNextToVoidsBetweenFourSamples) {
     for (int i = 0; i < voids; ++i) {
       source.heights[random() % source.heights.size()] = std::numeric_limits<float>::quiet_NaN();
     }
-    for (const Filter filter : {Filter::kLimitedCubic, Filter::kCatmullRom}) {
-      for_each_vertex_inside(source, filter, [&](float height, WorldPoint world, const std::vector<float>& around) {
-        if (around.size() < 4) return;
-        // A few float roundings of heights below 500.
-        ASSERT_NEAR(height, plane(world.x, world.z), 2e-4) << to_string(filter);
-      });
-    }
+    for_each_vertex_inside(source, Filter::kLimitedCubic,
+                           [&](float height, WorldPoint world, const std::vector<float>& around) {
+                             if (around.size() < 4) return;
+                             // A few float roundings of heights below 500.
+                             ASSERT_NEAR(height, plane(world.x, world.z), 2e-4);
+                           });
   }
 }
 

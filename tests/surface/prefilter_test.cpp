@@ -17,9 +17,7 @@ namespace isohf {
 namespace {
 
 constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
-constexpr Filter kAll[] = {Filter::kNearest,    Filter::kBilinear, Filter::kLimitedCubic,
-                           Filter::kCatmullRom, Filter::kBspline2, Filter::kBspline3,
-                           Filter::kBspline5,   Filter::kLanczos3, Filter::kLanczos6};
+constexpr Filter kAll[] = {Filter::kNearest, Filter::kBilinear, Filter::kLimitedCubic, Filter::kBspline3};
 
 struct Raster {
   std::int64_t columns;
@@ -68,7 +66,7 @@ std::vector<double> recursive_prefilter(std::vector<double> s, const std::vector
 TEST(Prefilter, OfInterpolatingKernelsAndPointsIsTheIdentity) {
   for (const Filter filter : kAll) {
     const Prefilter prefilter = make(filter);
-    EXPECT_EQ(prefilter.is_identity(), Kernel::make(filter).interpolates()) << to_string(filter);
+    EXPECT_EQ(prefilter.is_identity(), filter != Filter::kBspline3) << to_string(filter);
     EXPECT_NEAR(prefilter.worst_gain(), 1.0, 1e-12);
   }
   EXPECT_TRUE(make(Filter::kNearest, "box").is_identity());
@@ -82,7 +80,6 @@ TEST(Prefilter, ImpulseResponseOfTheCubicIsItsGeometricSeries) {
     EXPECT_NEAR(p[k], -6.0 * z / (1.0 - z * z) * std::pow(z, static_cast<double>(k)), 1e-13) << k;
   }
   EXPECT_EQ(make(Filter::kBspline3).halo(), 16 + 4);
-  EXPECT_EQ(make(Filter::kBspline5).halo(), 27 + 6);
 }
 
 TEST(Prefilter, AgreesWithUnsersRecursion) {
@@ -91,16 +88,12 @@ TEST(Prefilter, AgreesWithUnsersRecursion) {
     const char* acquisition;
     std::vector<double> poles;
   };
-  const double quintic_slow = -0.43057534709997430;
-  const double quintic_fast = -0.04309628820326465;
-  // Degree n + 1 for a box, n + 2 for a tent.
-  for (const Case& c :
-       {Case{Filter::kBspline2, "point", {std::sqrt(8.0) - 3.0}},
-        Case{Filter::kBspline3, "point", {std::sqrt(3.0) - 2.0}},
-        Case{Filter::kBspline5, "point", {quintic_slow, quintic_fast}},
-        Case{Filter::kBilinear, "box", {std::sqrt(8.0) - 3.0}}, Case{Filter::kBspline2, "box", {std::sqrt(3.0) - 2.0}},
-        Case{Filter::kBilinear, "tent", {std::sqrt(3.0) - 2.0}},
-        Case{Filter::kBspline3, "tent", {quintic_slow, quintic_fast}}}) {
+  const double quartic_slow = -0.36134122590022018;
+  const double quartic_fast = -0.01372542929733912;
+  // Degree n + 1 for a box.
+  for (const Case& c : {Case{Filter::kBspline3, "point", {std::sqrt(3.0) - 2.0}},
+                        Case{Filter::kBilinear, "box", {std::sqrt(8.0) - 3.0}},
+                        Case{Filter::kBspline3, "box", {quartic_slow, quartic_fast}}}) {
     for (const std::int64_t count : {2, 3, 5, 16, 17, 40, 100}) {
       Raster raster = random_raster(count, 1, 7);
       const std::vector<double> expected = recursive_prefilter({raster.heights.begin(), raster.heights.end()}, c.poles);
@@ -114,25 +107,23 @@ TEST(Prefilter, AgreesWithUnsersRecursion) {
 }
 
 TEST(Prefilter, SamplesAreReturnedAtTheirPlaces) {
-  for (const Filter filter : {Filter::kBspline2, Filter::kBspline3, Filter::kBspline5}) {
-    const Raster source = random_raster(33, 29, 3);
-    Raster raster = source;
-    make(filter).filter(raster.view());
-    const Kernel kernel = Kernel::make(filter);
-    for (std::int64_t r = 0; r < raster.rows; ++r) {
-      for (std::int64_t c = 0; c < raster.columns; ++c) {
-        const auto height = static_cast<double>(source.heights[static_cast<std::size_t>(r * 33 + c)]);
-        // White noise is the worst case: coefficients are up to 7.5^2 times the range, and rounded to float.
-        EXPECT_NEAR(evaluate(kernel, raster.view(), static_cast<double>(c), static_cast<double>(r)), height,
-                    4000.0 * 56.0 * 0x1p-23);
-      }
+  const Raster source = random_raster(33, 29, 3);
+  Raster raster = source;
+  make(Filter::kBspline3).filter(raster.view());
+  const Kernel kernel = Kernel::make(Filter::kBspline3);
+  for (std::int64_t r = 0; r < raster.rows; ++r) {
+    for (std::int64_t c = 0; c < raster.columns; ++c) {
+      const auto height = static_cast<double>(source.heights[static_cast<std::size_t>(r * 33 + c)]);
+      // White noise is the worst case: coefficients are up to 7.5^2 times the range, and rounded to float.
+      EXPECT_NEAR(evaluate(kernel, raster.view(), static_cast<double>(c), static_cast<double>(r)), height,
+                  4000.0 * 56.0 * 0x1p-23);
     }
   }
 }
 
 TEST(Prefilter, LevelGroundStaysExactlyLevel) {
   for (const Filter filter : kAll) {
-    for (const char* acquisition : {"point", "box", "tent", "gaussian:0.7"}) {
+    for (const char* acquisition : {"point", "box", "gaussian:0.7"}) {
       Raster raster{70, 41, std::vector<float>(70 * 41, 1234.567F)};
       const std::vector<float> before = raster.heights;
       make(filter, acquisition).filter(raster.view());
@@ -142,25 +133,23 @@ TEST(Prefilter, LevelGroundStaysExactlyLevel) {
 }
 
 TEST(Prefilter, PlanesAreTheirOwnCoefficientsUpToTheRimAndNextToVoids) {
-  for (const Filter filter : {Filter::kBspline2, Filter::kBspline3, Filter::kBspline5}) {
-    for (const double void_share : {0.0, 0.02, 0.3}) {
-      const Raster voids = random_raster(40, 35, 4, void_share);
-      const auto plane = [](std::int64_t c, std::int64_t r) {
-        return 300.0 + 3.0 * static_cast<double>(c) - 5.0 * static_cast<double>(r);
-      };
-      Raster raster = voids;
-      for (std::int64_t r = 0; r < 35; ++r) {
-        for (std::int64_t c = 0; c < 40; ++c) {
-          if (!std::isnan(voids.view()(c, r))) raster.view()(c, r) = static_cast<float>(plane(c, r));
-        }
+  for (const double void_share : {0.0, 0.02, 0.3}) {
+    const Raster voids = random_raster(40, 35, 4, void_share);
+    const auto plane = [](std::int64_t c, std::int64_t r) {
+      return 300.0 + 3.0 * static_cast<double>(c) - 5.0 * static_cast<double>(r);
+    };
+    Raster raster = voids;
+    for (std::int64_t r = 0; r < 35; ++r) {
+      for (std::int64_t c = 0; c < 40; ++c) {
+        if (!std::isnan(voids.view()(c, r))) raster.view()(c, r) = static_cast<float>(plane(c, r));
       }
-      make(filter).filter(raster.view());
-      for (std::int64_t r = 0; r < 35; ++r) {
-        for (std::int64_t c = 0; c < 40; ++c) {
-          if (std::isnan(voids.view()(c, r))) continue;
-          // Floats below 512 through a gain of at most 7.5 along either axis.
-          ASSERT_NEAR(raster.view()(c, r), plane(c, r), 512 * 56 * 0x1p-24) << to_string(filter) << c << "," << r;
-        }
+    }
+    make(Filter::kBspline3).filter(raster.view());
+    for (std::int64_t r = 0; r < 35; ++r) {
+      for (std::int64_t c = 0; c < 40; ++c) {
+        if (std::isnan(voids.view()(c, r))) continue;
+        // Floats below 512 through a gain of at most 7.5 along either axis.
+        ASSERT_NEAR(raster.view()(c, r), plane(c, r), 512 * 56 * 0x1p-24) << c << "," << r;
       }
     }
   }
@@ -171,8 +160,7 @@ TEST(Prefilter, PolynomialsUpToTheDegreeComeBackFromTheirPointsAndBoxMeans) {
     Filter filter;
     int degree;
   };
-  for (const Case& c : {Case{Filter::kBilinear, 1}, Case{Filter::kBspline2, 2}, Case{Filter::kBspline3, 3},
-                        Case{Filter::kBspline5, 5}}) {
+  for (const Case& c : {Case{Filter::kBilinear, 1}, Case{Filter::kBspline3, 3}}) {
     for (const bool box : {false, true}) {
       const int count = 121;
       const auto power = [&](double x) { return std::pow((x - 60.0) / 60.0, c.degree); };
@@ -225,12 +213,11 @@ TEST(Prefilter, ReacquiringTheReconstructionReturnsTheSource) {
   const std::vector<float> source = field.samples();
   const auto [low, high] = std::minmax_element(source.begin(), source.end());
   const double range = static_cast<double>(*high) - static_cast<double>(*low);
-  const Acquisition fir = fir_from_text("1 2 6 2 1", "f");
+  const Acquisition taps = with_taps(acquisition_from_string("1,2,6,2,1"));
   for (const Filter filter : kAll) {
     for (const Acquisition& acquisition :
-         {Acquisition{}, acquisition_from_string("box"), acquisition_from_string("tent"),
-          acquisition_from_string("gaussian:0.3"), acquisition_from_string("gaussian:0.5"),
-          acquisition_from_string("gaussian:0.7"), fir}) {
+         {Acquisition{}, acquisition_from_string("box"), acquisition_from_string("gaussian:0.3"),
+          acquisition_from_string("gaussian:0.5"), acquisition_from_string("gaussian:0.7"), taps}) {
       Raster raster{96, 96, source};
       Prefilter::make(filter, acquisition).filter(raster.view());
       const std::vector<double> response = sampled_response(Kernel::make(filter), acquisition);
@@ -257,30 +244,23 @@ TEST(Prefilter, IllPosedInversionsAreRefusedWithTheirGain) {
     return "accepted";
   };
   EXPECT_EQ(message(Filter::kBspline3, acquisition_from_string("gaussian:0.9")), "accepted");
-  for (const Filter filter : {Filter::kBilinear, Filter::kBspline3, Filter::kBspline5, Filter::kLanczos3}) {
+  for (const Filter filter : {Filter::kBilinear, Filter::kLimitedCubic, Filter::kBspline3}) {
     EXPECT_THAT(message(filter, acquisition_from_string("gaussian:1.2")), testing::HasSubstr("times is allowed"));
     EXPECT_NE(message(filter, acquisition_from_string("gaussian:100")), "accepted");
     // Its spectrum falls to 0 at the Nyquist frequency, or below it.
-    EXPECT_NE(message(filter, fir_from_text("1 2 1", "f")), "accepted");
-    EXPECT_THAT(message(filter, fir_from_text("1 1 1", "f")), testing::HasSubstr("without bound"));
+    EXPECT_NE(message(filter, acquisition_from_string("1,2,1")), "accepted");
+    EXPECT_THAT(message(filter, acquisition_from_string("1,1,1")), testing::HasSubstr("without bound"));
   }
   EXPECT_THAT(message(Filter::kBspline3, acquisition_from_string("gaussian:1.2")),
               testing::HasSubstr("waves of 2 samples"));
-}
-
-TEST(Prefilter, WorstGainIsThatOfTheAcquisitionAtNyquist) {
-  EXPECT_NEAR(make(Filter::kBspline5, "box").worst_gain(), std::numbers::pi / 2.0, 0.01);
-  EXPECT_NEAR(make(Filter::kBspline5, "gaussian:0.5").worst_gain(), std::exp(std::pow(0.5 * std::numbers::pi, 2) / 2.0),
-              0.3);
-  EXPECT_NEAR(Prefilter::make(Filter::kBspline3, fir_from_text("1 4 1", "f")).worst_gain(), 3.0, 1e-12);
 }
 
 TEST(Prefilter, EveryCutIntoBandsGivesTheSameBits) {
   std::mt19937_64 random(11);
   for (const double void_share : {0.0, 0.004, 0.3}) {
     for (const auto& [filter, acquisition] :
-         {std::pair{Filter::kBspline3, "point"}, std::pair{Filter::kBspline5, "box"},
-          std::pair{Filter::kLanczos3, "gaussian:0.5"}, std::pair{Filter::kBilinear, "point"}}) {
+         {std::pair{Filter::kBspline3, "point"}, std::pair{Filter::kBspline3, "box"},
+          std::pair{Filter::kLimitedCubic, "gaussian:0.5"}, std::pair{Filter::kBilinear, "point"}}) {
       const Prefilter prefilter = make(filter, acquisition);
       Raster source = random_raster(131, 150, 23, void_share);
       Raster whole = source;
@@ -312,9 +292,9 @@ TEST(Prefilter, CoefficientsGoOnIntoVoidsByTheBorderAndNoFurther) {
   for (const double void_share : {0.01, 0.5, 0.97, 1.0}) {
     Raster source = random_raster(90, 75, 5, void_share);
     Raster raster = source;
-    const Prefilter prefilter = make(Filter::kBspline5, "box");
+    const Prefilter prefilter = make(Filter::kBspline3, "box");
     const std::int64_t border = prefilter.border();
-    EXPECT_EQ(border, 3);
+    EXPECT_EQ(border, 2);
     prefilter.filter(raster.view());
     for (std::int64_t r = 0; r < raster.rows; ++r) {
       for (std::int64_t c = 0; c < raster.columns; ++c) {
@@ -334,9 +314,9 @@ TEST(Prefilter, CoefficientsGoOnIntoVoidsByTheBorderAndNoFurther) {
         if (far) {
           ASSERT_TRUE(std::isnan(raster.view()(c, r))) << c << " " << r;
         }
-        // Largest possible: 12^2 per unit of range.
+        // Largest possible: 5^2 per unit of range.
         if (near) {
-          ASSERT_LT(std::abs(raster.view()(c, r)), 4000.0F * 144.0F);
+          ASSERT_LT(std::abs(raster.view()(c, r)), 4000.0F * 25.0F);
         }
       }
     }
@@ -344,28 +324,26 @@ TEST(Prefilter, CoefficientsGoOnIntoVoidsByTheBorderAndNoFurther) {
 }
 
 TEST(Prefilter, EverySampleKeepsItsHeightAmongVoids) {
-  for (const Filter filter : {Filter::kBspline2, Filter::kBspline3, Filter::kBspline5}) {
-    for (const double void_share : {0.01, 0.2, 0.6, 0.95}) {
-      Raster source = random_raster(60, 50, 9, void_share);
-      Raster raster = source;
-      make(filter).filter(raster.view());
-      const Kernel kernel = Kernel::make(filter);
-      for (std::int64_t r = 0; r < source.rows; ++r) {
-        for (std::int64_t c = 0; c < source.columns; ++c) {
-          const auto height = static_cast<double>(source.view()(c, r));
-          if (std::isnan(height)) continue;
-          const TapWeights across = kernel.at(static_cast<double>(c));
-          const TapWeights down = kernel.at(static_cast<double>(r));
-          double sum = 0.0;
-          for (int j = 0; j < kernel.taps(); ++j) {
-            for (int i = 0; i < kernel.taps(); ++i) {
-              sum += static_cast<double>(across.weights[static_cast<std::size_t>(i)]) *
-                     static_cast<double>(down.weights[static_cast<std::size_t>(j)]) *
-                     continued(raster.view(), across.first + i, down.first + j);
-            }
+  for (const double void_share : {0.01, 0.2, 0.6, 0.95}) {
+    Raster source = random_raster(60, 50, 9, void_share);
+    Raster raster = source;
+    make(Filter::kBspline3).filter(raster.view());
+    const Kernel kernel = Kernel::make(Filter::kBspline3);
+    for (std::int64_t r = 0; r < source.rows; ++r) {
+      for (std::int64_t c = 0; c < source.columns; ++c) {
+        const auto height = static_cast<double>(source.view()(c, r));
+        if (std::isnan(height)) continue;
+        const TapWeights across = kernel.at(static_cast<double>(c));
+        const TapWeights down = kernel.at(static_cast<double>(r));
+        double sum = 0.0;
+        for (int j = 0; j < kernel.taps(); ++j) {
+          for (int i = 0; i < kernel.taps(); ++i) {
+            sum += static_cast<double>(across.weights[static_cast<std::size_t>(i)]) *
+                   static_cast<double>(down.weights[static_cast<std::size_t>(j)]) *
+                   continued(raster.view(), across.first + i, down.first + j);
           }
-          ASSERT_NEAR(sum, height, 4000.0 * 56.0 * 0x1p-23) << to_string(filter) << " " << c << " " << r;
         }
+        ASSERT_NEAR(sum, height, 4000.0 * 56.0 * 0x1p-23) << c << " " << r;
       }
     }
   }
@@ -438,24 +416,17 @@ NextToVoids next_to_voids(const Kernel& kernel, std::uint64_t seed) {
 }
 
 TEST(Prefilter, NextToVoidsSplinesStayNearTheSamplesAroundThem) {
-  double worst_free = 0.0;
   for (const std::uint64_t seed : {3U, 6U}) {
-    for (const Filter filter :
-         {Filter::kCatmullRom, Filter::kBspline3, Filter::kBspline5, Filter::kLanczos3, Filter::kLanczos6}) {
-      const NextToVoids found = next_to_voids(Kernel::make(filter), seed);
-      EXPECT_LE(found.worst_beyond, 0.25 + 1e-3) << to_string(filter);  // samples are floats, and cells nearly level
-      EXPECT_LT(found.worst_error, 0.031) << to_string(filter);
-    }
-    const NextToVoids free = next_to_voids(Kernel::make(Filter::kBspline5, Edges::kOdd), seed);
-    worst_free = std::max(worst_free, free.worst_error);
-    EXPECT_GT(free.worst_beyond, 1.0);
-    EXPECT_LT(next_to_voids(Kernel::make(Filter::kBspline2), seed).worst_error, 0.031);
+    const NextToVoids found = next_to_voids(Kernel::make(Filter::kBspline3), seed);
+    EXPECT_LE(found.worst_beyond, 0.25 + 1e-3);  // samples are floats, and cells nearly level
+    EXPECT_LT(found.worst_error, 0.031);
+    const NextToVoids free = next_to_voids(Kernel::make(Filter::kBspline3, Edges::kOdd), seed);
+    EXPECT_GT(free.worst_beyond, 1.0) << "there is nothing to hold";
   }
-  EXPECT_GT(worst_free, 0.045) << "there is nothing to hold";
 }
 
 TEST(Prefilter, NothingIsSeenAcrossAWallOfVoids) {
-  const Prefilter prefilter = make(Filter::kBspline5);
+  const Prefilter prefilter = make(Filter::kBspline3);
   const std::int64_t thickness = 2 * prefilter.border() + 1;  // thinner ones are bridged
   Raster a = random_raster(60, 60, 1);
   Raster b = random_raster(60, 60, 2);
@@ -492,15 +463,15 @@ TEST(Prefilter, FarFromVoidsTheyChangeNothing) {
 TEST(Prefilter, LoneSamplesAreLevelGround) {
   Raster raster{9, 9, std::vector<float>(81, kVoid)};
   raster.view()(4, 4) = 77.25F;
-  make(Filter::kBspline5, "gaussian:0.7").filter(raster.view());
+  make(Filter::kBspline3, "gaussian:0.7").filter(raster.view());
   for (std::int64_t r = 0; r < 9; ++r) {
     for (std::int64_t c = 0; c < 9; ++c) {
-      const bool within = std::max(std::abs(c - 4), std::abs(r - 4)) <= 3;
+      const bool within = std::max(std::abs(c - 4), std::abs(r - 4)) <= 2;
       EXPECT_TRUE(within ? raster.view()(c, r) == 77.25F : std::isnan(raster.view()(c, r))) << c << " " << r;
     }
   }
   Raster one{1, 1, {3.5F}};
-  make(Filter::kBspline5).filter(one.view());
+  make(Filter::kBspline3).filter(one.view());
   EXPECT_EQ(one.heights[0], 3.5F);
 }
 
@@ -516,40 +487,34 @@ TEST(Prefilter, KernelsReachTheirPsnrOnBandLimitedFields) {
   const TrigonometricField white(128, 0.0, 0.7, 1);
   // Published figures of the reference implementation.
   for (const Case& c : {Case{Filter::kNearest, 40.5, 41.4, 25.2}, Case{Filter::kBilinear, 48.3, 52.2, 30.9},
-                        Case{Filter::kCatmullRom, 53.0, 61.1, 37.8}, Case{Filter::kBspline3, 57.1, 72.1, 47.9},
-                        Case{Filter::kBspline5, 60.3, 86.2, 61.2}, Case{Filter::kLanczos3, 56.9, 68.7, 50.4},
-                        Case{Filter::kLanczos6, 62.1, 78.2, 66.0}}) {
+                        Case{Filter::kBspline3, 57.1, 72.1, 47.9}}) {
     // White fields have a smaller range that varies by half a dB from one to the next.
     EXPECT_GE(psnr_of_resampling(c.filter, full, 24), c.full_band) << to_string(c.filter);
     EXPECT_GE(psnr_of_resampling(c.filter, narrow, 24), c.narrow_band) << to_string(c.filter);
     EXPECT_GE(psnr_of_resampling(c.filter, white, 24), c.white - 0.5) << to_string(c.filter);
   }
-  EXPECT_GE(psnr_of_round_trip(Filter::kBspline5, full, 24), 60.3);
-  EXPECT_GE(psnr_of_round_trip(Filter::kBspline5, narrow, 24), 82.1);
 }
 
 TEST(Prefilter, RowsThatWrapAreTheMiddleOfManyTurns) {
   for (const std::int64_t columns : {5, 37, 90}) {
     for (const double voids : {0.0, 0.05}) {
-      for (const Filter filter : {Filter::kBspline2, Filter::kBspline3, Filter::kBspline5}) {
-        const Prefilter prefilter = Prefilter::make(filter, {});
-        Raster once = random_raster(columns, 6, 5, voids);
-        // Enough turns for the middle one to know nothing of the ends.
-        const std::int64_t turns = 2 * (prefilter.halo() / columns + 1) + 1;
-        Raster many{columns * turns, 6, {}};
-        for (std::int64_t r = 0; r < 6; ++r) {
-          for (std::int64_t c = 0; c < many.columns; ++c) many.heights.push_back(once.view()(c % columns, r));
-        }
-        prefilter.filter_rows(once.view(), true);
-        prefilter.filter_rows(many.view());
-        for (std::int64_t r = 0; r < 6; ++r) {
-          for (std::int64_t c = 0; c < columns; ++c) {
-            const float expected = many.view()(turns / 2 * columns + c, r);
-            const float found = once.view()(c, r);
-            ASSERT_EQ(std::isnan(found), std::isnan(expected)) << to_string(filter) << " " << c << "," << r;
-            if (std::isnan(found)) continue;
-            ASSERT_EQ(found, expected) << to_string(filter) << " " << c << "," << r;
-          }
+      const Prefilter prefilter = make(Filter::kBspline3);
+      Raster once = random_raster(columns, 6, 5, voids);
+      // Enough turns for the middle one to know nothing of the ends.
+      const std::int64_t turns = 2 * (prefilter.halo() / columns + 1) + 1;
+      Raster many{columns * turns, 6, {}};
+      for (std::int64_t r = 0; r < 6; ++r) {
+        for (std::int64_t c = 0; c < many.columns; ++c) many.heights.push_back(once.view()(c % columns, r));
+      }
+      prefilter.filter_rows(once.view(), true);
+      prefilter.filter_rows(many.view());
+      for (std::int64_t r = 0; r < 6; ++r) {
+        for (std::int64_t c = 0; c < columns; ++c) {
+          const float expected = many.view()(turns / 2 * columns + c, r);
+          const float found = once.view()(c, r);
+          ASSERT_EQ(std::isnan(found), std::isnan(expected)) << c << "," << r;
+          if (std::isnan(found)) continue;
+          ASSERT_EQ(found, expected) << c << "," << r;
         }
       }
     }

@@ -17,9 +17,7 @@ namespace isohf {
 namespace {
 
 constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
-constexpr Filter kFilters[] = {Filter::kNearest,    Filter::kBilinear, Filter::kLimitedCubic,
-                               Filter::kCatmullRom, Filter::kBspline2, Filter::kBspline3,
-                               Filter::kBspline5,   Filter::kLanczos3, Filter::kLanczos6};
+constexpr Filter kFilters[] = {Filter::kNearest, Filter::kBilinear, Filter::kLimitedCubic, Filter::kBspline3};
 
 /// A projected source held whole.
 struct Fixture {
@@ -96,7 +94,7 @@ double slope(double longitude, double latitude) {
 TEST(WarpedResampler, ReproducesAPlaneOfTheSourceAtEveryVertexToItsVeryEdge) {
   for (const char* request : {"lambert-conformal", "transverse-mercator", "local"}) {
     const Fixture source(request, {5.0, 40.0, 12.0, 46.0}, 140, 120, slope);
-    for (const Filter filter : {Filter::kBilinear, Filter::kLimitedCubic, Filter::kCatmullRom, Filter::kBspline3}) {
+    for (const Filter filter : {Filter::kBilinear, Filter::kLimitedCubic, Filter::kBspline3}) {
       source.for_each_vertex(filter, Outside::kCover, [&](float height, SourcePosition at, LatticeVertex) {
         if (!source.is_inside(at, 0.0)) return;
         const WarpPlace& place = *source.geometry.warp;
@@ -117,7 +115,7 @@ TEST(WarpedResampler, GoesRoundTheSeamAndOverThePole) {
   };
   const Fixture source("polar-stereographic", {-180.0, 60.0, 180.0, 90.0}, 720, 120, waves, true);
   std::int64_t near_seam = 0;
-  for (const Filter filter : {Filter::kBilinear, Filter::kCatmullRom, Filter::kLanczos3}) {
+  for (const Filter filter : {Filter::kBilinear, Filter::kLimitedCubic, Filter::kBspline3}) {
     source.for_each_vertex(filter, Outside::kCover, [&](float height, SourcePosition at, LatticeVertex) {
       if (!source.is_inside(at, 0.0)) return;
       const WarpPlace& place = *source.geometry.warp;

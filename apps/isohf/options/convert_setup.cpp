@@ -154,18 +154,15 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments, C
   add_shape_options(line, options.convert.plan);
   add_quantisation_options(line, options.convert);
   line.group("Reconstruction");
-  line.option(
-      "--filter", "NAME",
-      "nearest, bilinear, limited-cubic, catmull-rom, bspline2, bspline3, bspline5, lanczos3 or lanczos6 (default " +
-          to_string(kDefaultFilter) + ")",
-      [&](const std::string& text) { options.convert.filter = filter_from_string(text); });
-  line.words({"nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3",
-              "lanczos6"});
+  line.option("--filter", "NAME",
+              "nearest, bilinear, limited-cubic or bspline3 (default " + to_string(kDefaultFilter) + ")",
+              [&](const std::string& text) { options.convert.filter = filter_from_string(text); });
+  line.words({"nearest", "bilinear", "limited-cubic", "bspline3"});
   line.option("--acquisition", "NAME",
-              "Account for how samples were taken: point, box, tent, gaussian:SIGMA or fir:FILE (default " +
+              "Account for how samples were taken: point, box, gaussian:SIGMA or taps as 0.25,0.5,0.25 (default " +
                   to_string(options.convert.acquisition) + ")",
               [&](const std::string& text) { options.convert.acquisition = acquisition_from_string(text); });
-  line.words({"point", "box", "tent", "gaussian", "fir"});
+  line.words({"point", "box", "gaussian"});
   line.group("Size and speed");
   line.option("--level", "N",
               fmt::format("Effort to make the archive small, {} to {} (default {}); the elevations are the same",
@@ -238,18 +235,6 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments, C
   return options;
 }
 
-namespace {
-
-/// Files beside the input that decide what is written.
-std::vector<std::string> files_beside(const ConvertCommandOptions& options) {
-  std::vector<std::string> files;
-  if (!options.geoid.path.empty()) files.push_back(options.geoid.path);
-  if (!options.convert.acquisition.path.empty()) files.push_back(options.convert.acquisition.path);
-  return files;
-}
-
-}  // namespace
-
 Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files) {
   options.inputs.onto = options.convert.plan.ground.projection;
   OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work);
@@ -259,7 +244,7 @@ Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files)
   understand_ground(prepared.source->info(), options.convert.plan.ground);
   options.input = prepared.source->info().path;
   options.convert.source_note = opened.note;
-  for (const std::string& file : files_beside(options)) {
+  if (const std::string& file = options.geoid.path; !file.empty()) {
     prepared.files.push_back(file);
     options.convert.source_note.fingerprint += fmt::format(" | {} {}", file, FileStamp::of(file).text());
   }

@@ -7,19 +7,9 @@
 namespace isohf {
 
 /// Reconstruction kernels: how a height between samples follows from the samples around it.
-enum class Filter {
-  kNearest,
-  kBilinear,
-  kLimitedCubic,
-  kCatmullRom,
-  kBspline2,
-  kBspline3,
-  kBspline5,
-  kLanczos3,
-  kLanczos6
-};
+enum class Filter { kNearest, kBilinear, kLimitedCubic, kBspline3 };
 
-/// "nearest", "bilinear", "limited-cubic", "catmull-rom", "bspline2", "bspline3", "bspline5", "lanczos3", "lanczos6".
+/// "nearest", "bilinear", "limited-cubic", "bspline3".
 [[nodiscard]] std::string to_string(Filter filter);
 /// The inverse of to_string; throws Error{kInvalidArgument} naming all of them for any other text.
 [[nodiscard]] Filter filter_from_string(const std::string& text);
@@ -36,7 +26,7 @@ enum class Edges {
 
 [[nodiscard]] std::string to_string(Edges edges);                ///< "mirror", "odd", "odd-held"
 [[nodiscard]] Edges edges_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
-/// What convert() does: kHeld, and kOdd of filters that it changes nothing of or that read three samples.
+/// What convert() does: kHeld for kBspline3, kOdd for filters whose result it does not change.
 [[nodiscard]] Edges usual_edges(Filter filter);
 
 /// What surrounds the source: tiles reach past its last sample unless they were fitted to it.
@@ -56,20 +46,19 @@ struct Acquisition {
   enum class Kind {
     kPoint,     ///< the height at the sample's position
     kBox,       ///< the mean over the sample's own area
-    kTent,      ///< the mean weighted by a tent two samples wide
     kGaussian,  ///< the mean weighted by a normal density of standard deviation `sigma`
-    kFir,       ///< a weighted mean of point readings, one sample apart
+    kTaps,      ///< a weighted mean of point readings, one sample apart
   };
   Kind kind = Kind::kPoint;
-  double sigma = 0.0;        ///< kGaussian: above 0, at most 100
-  std::vector<double> taps;  ///< kFir: odd count, symmetric, sum 1; the middle one belongs to the sample's own position
-  std::string path;          ///< kFir: the file of the taps, which is read where `taps` is empty
+  double sigma = 0.0;  ///< kGaussian: above 0, at most 100
+  /// kTaps: an odd number of at most 255, symmetric (the reconstruction could not be mirrored at the raster's edges
+  /// otherwise); the middle one belongs to the sample's own position. They are divided by their sum, which is not 0.
+  std::vector<double> taps;
 };
 
-/// "point", "box", "tent", "gaussian:SIGMA" or "fir:FILE", whose file is not looked at. Throws Error{kInvalidArgument}
-/// for any other text.
+/// "point", "box", "gaussian:SIGMA" or taps as in "0.25,0.5,0.25". Throws Error{kInvalidArgument} for any other text.
 [[nodiscard]] Acquisition acquisition_from_string(const std::string& text);
-/// The inverse; the shortest SIGMA that reads back as the same number.
+/// The inverse; the shortest numbers that read back as the same ones.
 [[nodiscard]] std::string to_string(const Acquisition& acquisition);
 
 }  // namespace isohf

@@ -186,8 +186,9 @@ Sums Windows::errors_in(HeldWindow& window, const Plan& plan, const Reconstructi
     std::vector<double> v(u.size());
     SourceWarp(tile, *geometry.warp, 0.0).positions({0, 0}, u, v);
     const auto [least, most] = std::minmax_element(u.begin(), u.end());
+    constexpr std::int64_t kMargin = 12;  ///< for a kernel's taps, and for the most of its prefilter's
     if (!(*least > -1e9 && *most < 1e9)) return {};
-    columns = {static_cast<std::int64_t>(*least) - kMaxTaps, static_cast<std::int64_t>(*most) + kMaxTaps};
+    columns = {static_cast<std::int64_t>(*least) - kMargin, static_cast<std::int64_t>(*most) + kMargin};
     columns = {std::max<std::int64_t>(columns.first, 0), std::min(columns.last, info_.width - 1)};
   }
   const auto cutter = make_tile_resampler(tile, geometry, by.kernel, {-HUGE_VAL, HUGE_VAL});

@@ -225,7 +225,7 @@ TilesAround make_around(const Conversion& conversion, const ShardWork& shard, co
 void check(const ConvertOptions& options) {
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, why); };
   require_known("`code_type`", options.code_type, CodeType::kF32);
-  require_known("filter", options.filter.value_or(kDefaultFilter), Filter::kLanczos6);
+  require_known("filter", options.filter.value_or(kDefaultFilter), Filter::kBspline3);
   (void)with_taps(options.acquisition);
   if (options.level < kMinLevel || options.level > kMaxLevel) {
     refuse(fmt::format("level is {}, must be {} to {}", options.level, kMinLevel, kMaxLevel));

@@ -69,7 +69,7 @@ TEST_F(ZRange, BothEndsHoldWhateverTheStepAndTheType) {
     const std::vector<std::string> way = i < ways.size() ? ways[i] : std::vector<std::string>{};
     std::vector<std::string> more = {"--z-range", "0:100", "--clamp-range", "--json"};
     more.insert(more.end(), way.begin(), way.end());
-    const std::string filter = i < ways.size() ? "bilinear" : "catmull-rom";
+    const std::string filter = i < ways.size() ? "bilinear" : "limited-cubic";
     const std::string named = way.empty() ? filter : way.front() + " " + way.back();
     const RunResult result = convert(more, filter);
     ASSERT_EQ(result.exit_code, 0) << named << result.err;

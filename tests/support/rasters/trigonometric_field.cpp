@@ -57,22 +57,12 @@ std::vector<float> TrigonometricField::samples() const {
 
 namespace {
 
-/// Missing taps of a line from its middle two outwards: each is the mirror image of one inside, at the last that was
-/// there as a point.
+/// Missing taps of a line of four: each is the mirror image of one inside, at one of the middle two as a point.
 template <typename Tap>
-void go_on(int taps, Tap tap) {
-  const int middle = taps / 2 - 1;
-  int last[] = {middle, middle + 1};
-  if (std::isnan(tap(last[0])) || std::isnan(tap(last[1]))) return;
-  bool ended[] = {false, false};
-  for (int distance = 1; distance <= middle; ++distance) {
-    for (const int side : {0, 1}) {
-      const int k = side == 0 ? middle - distance : middle + 1 + distance;
-      ended[side] = ended[side] || std::isnan(tap(k));
-      if (!ended[side]) last[side] = k;
-      if (std::isnan(tap(k))) tap(k) = 2.0 * tap(last[side]) - tap(2 * last[side] - k);
-    }
-  }
+void go_on(Tap tap) {
+  if (std::isnan(tap(1)) || std::isnan(tap(2))) return;
+  if (std::isnan(tap(0))) tap(0) = 2.0 * tap(1) - tap(2);
+  if (std::isnan(tap(3))) tap(3) = 2.0 * tap(2) - tap(1);
 }
 
 }  // namespace
@@ -125,9 +115,9 @@ double evaluate(const Kernel& kernel, View2D<const float> coefficients, View2D<c
     }
   }
   if (valid < 0.5) return nothing;
-  if (kernel.edges() != Edges::kMirror && taps % 2 == 0) {
-    for (int line = 0; line < 2 * taps; ++line) {  // rows, then columns
-      go_on(taps, [&](int k) -> double& { return line < taps ? tap(k, line) : tap(line - taps, k); });
+  if (kernel.edges() != Edges::kMirror && taps == 4) {
+    for (int line = 0; line < 8; ++line) {  // rows, then columns
+      go_on([&](int k) -> double& { return line < 4 ? tap(k, line) : tap(line - 4, k); });
     }
   }
   double weight = 0.0;
@@ -195,50 +185,6 @@ double psnr_of_resampling(Filter filter, const TrigonometricField& field, int ma
     for (int c = 0; c < columns; ++c) {
       const double error =
           evaluate(kernel, {coefficients.data(), n, n}, first + c * step, v) - exact[static_cast<std::size_t>(c)];
-      squares += error * error;
-      ++count;
-    }
-  }
-  return psnr(samples, squares, count);
-}
-
-double psnr_of_round_trip(Filter filter, const TrigonometricField& field, int margin) {
-  const int n = field.n();
-  const std::vector<float> samples = field.samples();
-  std::vector<float> coefficients = samples;
-  const Prefilter prefilter = Prefilter::make(filter, Acquisition{});
-  prefilter.filter({coefficients.data(), n, n});
-  const Kernel kernel = Kernel::make(filter);
-  const double row_step = 0.5 * std::sqrt(3.0);
-  const int rows = static_cast<int>((n - 1) / row_step) + 1;
-  std::vector<float> lattice;
-  for (int r = 0; r < rows; ++r) {
-    for (int c = 0; c < n; ++c) {
-      const double u = c + 0.5 * (r & 1);
-      lattice.push_back(static_cast<float>(evaluate(kernel, {coefficients.data(), n, n}, u, r * row_step)));
-    }
-  }
-  // Along each row back to the source's columns; only then are the samples of a column in line.
-  const View2D<float> view(lattice.data(), n, rows);
-  prefilter.filter_rows(view);
-  std::vector<float> straight(lattice.size());
-  const View2D<float> columns(straight.data(), n, rows);
-  for (int r = 0; r < rows; ++r) {
-    const View2D<const float> row(view.row(r), n, 1);
-    for (int c = 0; c < n; ++c) columns(c, r) = static_cast<float>(evaluate(kernel, row, c - 0.5 * (r & 1), 0.0));
-  }
-  prefilter.filter_columns(columns, 0, columns);
-  double squares = 0.0;
-  std::int64_t count = 0;
-  for (int r = margin; r < n - margin; ++r) {
-    const TapWeights down = kernel.at(r / row_step);
-    for (int c = margin; c < n - margin; ++c) {
-      double height = 0.0;
-      for (int j = 0; j < kernel.taps(); ++j) {
-        height += static_cast<double>(down.weights[static_cast<std::size_t>(j)]) *
-                  static_cast<double>(columns(c, down.first + j));
-      }
-      const double error = height - static_cast<double>(samples[static_cast<std::size_t>(r * n + c)]);
       squares += error * error;
       ++count;
     }

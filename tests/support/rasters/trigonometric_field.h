@@ -42,8 +42,4 @@ class TrigonometricField {
 /// at least `margin` samples from the square's edge count.
 [[nodiscard]] double psnr_of_resampling(Filter filter, const TrigonometricField& field, int margin);
 
-/// The same for ortho -> iso -> ortho on the lattice of column step 1 and row step sqrt(3) / 2, which contains the
-/// square band; back by the separable inverse: along each lattice row to the source's columns, then along columns.
-[[nodiscard]] double psnr_of_round_trip(Filter filter, const TrigonometricField& field, int margin);
-
 }  // namespace isohf

@@ -1,12 +1,12 @@
 #include "isohf/surface/resample/acquisition.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <functional>
 #include <numbers>
 #include <optional>
@@ -20,7 +20,6 @@ namespace {
 
 constexpr double kLargestSigma = 100.0;
 constexpr std::size_t kMostTaps = 255;
-constexpr std::size_t kMostBytes = 65536;  ///< of a FIR file
 /// A normal density holds less than 3e-19 beyond so many standard deviations.
 constexpr double kGaussianReach = 9.0;
 
@@ -88,8 +87,6 @@ double response_at(const Kernel& kernel, const Acquisition& acquisition, int k) 
       return kernel.value(k);
     case Acquisition::Kind::kBox:
       return integral(-0.5, 0.5, 0.5, [&](double x) { return kernel.value(k - x); });
-    case Acquisition::Kind::kTent:
-      return integral(-1.0, 1.0, 0.5, [&](double x) { return (1.0 - std::abs(x)) * kernel.value(k - x); });
     case Acquisition::Kind::kGaussian: {
       const double sigma = acquisition.sigma;
       const double reach = kGaussianReach * sigma;
@@ -98,7 +95,7 @@ double response_at(const Kernel& kernel, const Acquisition& acquisition, int k) 
           std::max(-reach, k - kernel.support()), std::min(reach, k + kernel.support()), sigma,
           [&](double x) { return scale * std::exp(-0.5 * (x / sigma) * (x / sigma)) * kernel.value(k - x); });
     }
-    case Acquisition::Kind::kFir: {
+    case Acquisition::Kind::kTaps: {
       const int middle = static_cast<int>(acquisition.taps.size() / 2);
       double sum = 0.0;
       for (int j = -middle; j <= middle; ++j) {
@@ -116,11 +113,15 @@ void require_sigma(double sigma, const std::string& text) {
                      kLargestSigma));
 }
 
-/// Holds taps against what makes a filter, and makes their sum 1; `where` they are from.
-void normalise(std::vector<double>& taps, const std::string& where) {
+/// Checks that taps are a filter, and makes their sum 1.
+void normalise(std::vector<double>& taps) {
   const std::size_t count = taps.size();
-  if (count > kMostTaps) refuse(fmt::format("{}: more than {} taps", where, kMostTaps));
-  if (count % 2 == 0) refuse(fmt::format("{}: {} taps, must be an odd number", where, count));
+  const auto refuse_taps = [](const std::string& why) {
+    refuse("acquisition by taps: " + why +
+           ". Give an odd number of taps, the same from both ends, whose sum is not 0, as in 0.25,0.5,0.25");
+  };
+  if (count > kMostTaps) refuse_taps(fmt::format("there are more than {}", kMostTaps));
+  if (count % 2 == 0) refuse_taps(fmt::format("there are {}", count));
   double sum = 0.0;
   double size = 0.0;
   for (const double tap : taps) {
@@ -129,14 +130,13 @@ void normalise(std::vector<double>& taps, const std::string& where) {
   }
   // Decimal fractions of a sum leave 1e-16 or so of each tap.
   if (std::abs(sum) <= 1e-12 * size || !std::isfinite(size)) {
-    refuse(fmt::format("{}: the taps sum to {}, so that level ground would read as nothing", where, sum));
+    refuse_taps(fmt::format("they sum to {}", sum));
   }
   for (std::size_t i = 0; i < count / 2; ++i) {
     const double left = taps[i];
     const double right = taps[count - 1 - i];
     if (std::abs(left - right) > 1e-9 * size) {
-      refuse(fmt::format("{}: taps {} and {} are {} and {}; the filter must be symmetric", where, i + 1, count - i,
-                         left, right));
+      refuse_taps(fmt::format("taps {} and {} are {} and {}", i + 1, count - i, left, right));
     }
     taps[i] = taps[count - 1 - i] = 0.5 * (left + right);
   }
@@ -149,11 +149,9 @@ double reach_of(const Acquisition& acquisition) {
       return 0.0;
     case Acquisition::Kind::kBox:
       return 0.5;
-    case Acquisition::Kind::kTent:
-      return 1.0;
     case Acquisition::Kind::kGaussian:
       return kGaussianReach * acquisition.sigma;
-    case Acquisition::Kind::kFir:
+    case Acquisition::Kind::kTaps:
       return (static_cast<double>(acquisition.taps.size()) - 1.0) / 2.0;  // their number is odd
   }
   return 0.0;
@@ -164,8 +162,8 @@ double reach_of(const Acquisition& acquisition) {
 Acquisition acquisition_from_string(const std::string& text) {
   Acquisition result;
   if (text == "point") return result;
-  if (text == "box" || text == "tent") {
-    result.kind = text == "box" ? Acquisition::Kind::kBox : Acquisition::Kind::kTent;
+  if (text == "box") {
+    result.kind = Acquisition::Kind::kBox;
     return result;
   }
   const std::string_view view = text;
@@ -176,12 +174,18 @@ Acquisition acquisition_from_string(const std::string& text) {
     result.sigma = *sigma;
     return result;
   }
-  if (view.starts_with("fir:")) {
-    result.kind = Acquisition::Kind::kFir;
-    result.path = text.substr(4);
-    return result;
+  result.kind = Acquisition::Kind::kTaps;
+  for (std::size_t at = 0; at <= view.size();) {
+    const std::size_t end = std::min(view.find(',', at), view.size());
+    const std::optional<double> tap = number_from(view.substr(at, end - at));
+    if (!tap) {
+      refuse(fmt::format("acquisition is \"{}\", must be point, box, gaussian:SIGMA or taps as 0.25,0.5,0.25", text));
+    }
+    result.taps.push_back(*tap);
+    at = end + 1;
   }
-  refuse(fmt::format("acquisition is \"{}\", must be point, box, tent, gaussian:SIGMA or fir:FILE", text));
+  (void)with_taps(result);
+  return result;
 }
 
 std::string to_string(const Acquisition& acquisition) {
@@ -190,60 +194,20 @@ std::string to_string(const Acquisition& acquisition) {
       return "point";
     case Acquisition::Kind::kBox:
       return "box";
-    case Acquisition::Kind::kTent:
-      return "tent";
     case Acquisition::Kind::kGaussian:
       return fmt::format("gaussian:{}", acquisition.sigma);
-    case Acquisition::Kind::kFir:
-      return "fir:" + acquisition.path;
+    case Acquisition::Kind::kTaps:
+      return fmt::format("{}", fmt::join(acquisition.taps, ","));
   }
   return {};
 }
 
 Acquisition with_taps(const Acquisition& acquisition) {
-  require_known("`acquisition`", acquisition.kind, Acquisition::Kind::kFir);
-  if (acquisition.kind == Acquisition::Kind::kGaussian) require_sigma(acquisition.sigma, to_string(acquisition));
-  if (acquisition.kind != Acquisition::Kind::kFir) return acquisition;
-  if (!acquisition.taps.empty()) {
-    Acquisition used = acquisition;
-    normalise(used.taps, "`acquisition`");
-    return used;
-  }
-  const std::string& path = acquisition.path;
-  if (path.empty()) refuse("`acquisition` by taps has neither taps nor a file of them");
-  std::ifstream file(path, std::ios::binary);
-  std::string contents(kMostBytes + 1, ' ');
-  file.read(contents.data(), static_cast<std::streamsize>(contents.size()));
-  if (!file.eof()) {  // neither opened, or not readable, or longer
-    if (file) refuse(fmt::format("{}: taps of an acquisition filter must not be more than {} bytes", path, kMostBytes));
-    throw Error(ErrorCode::kIo, path + ": cannot read the taps of the acquisition filter");
-  }
-  contents.resize(static_cast<std::size_t>(file.gcount()));
-  return fir_from_text(contents, path);
-}
-
-Acquisition fir_from_text(const std::string& text, const std::string& path) {
-  Acquisition result;
-  result.kind = Acquisition::Kind::kFir;
-  result.path = path;
-  constexpr std::string_view kSpace = " \t\r\n\f\v";
-  const std::string_view view = text;
-  std::size_t at = 0;
-  while ((at = view.find_first_not_of(kSpace, at)) != std::string_view::npos) {
-    if (view[at] == '#') {
-      at = std::min(view.find('\n', at), view.size());
-      continue;
-    }
-    const std::size_t end = std::min(view.find_first_of(" \t\r\n\f\v#", at), view.size());
-    const std::string_view word = view.substr(at, end - at);
-    const std::optional<double> tap = number_from(word);
-    if (!tap) refuse(fmt::format("{}: byte {}: \"{}\" is not a finite number", path, at, word.substr(0, 40)));
-    if (result.taps.size() == kMostTaps) refuse(fmt::format("{}: more than {} taps", path, kMostTaps));
-    result.taps.push_back(*tap);
-    at = end;
-  }
-  normalise(result.taps, path);
-  return result;
+  require_known("`acquisition`", acquisition.kind, Acquisition::Kind::kTaps);
+  Acquisition used = acquisition;
+  if (used.kind == Acquisition::Kind::kGaussian) require_sigma(used.sigma, to_string(used));
+  if (used.kind == Acquisition::Kind::kTaps) normalise(used.taps);
+  return used;
 }
 
 std::vector<double> sampled_response(const Kernel& kernel, const Acquisition& acquisition) {

@@ -1,7 +1,6 @@
 #include "isohf/surface/resample/kernels.h"
 
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "isohf/base/handed_in.h"
@@ -16,30 +15,17 @@ struct FilterEntry {
   int taps;
 };
 
-constexpr std::array<FilterEntry, 9> kFilters = {{
+constexpr std::array<FilterEntry, 4> kFilters = {{
     {Filter::kNearest, "nearest", 1},
     {Filter::kBilinear, "bilinear", 2},
     {Filter::kLimitedCubic, "limited-cubic", 4},
-    {Filter::kCatmullRom, "catmull-rom", 4},
-    {Filter::kBspline2, "bspline2", 3},
     {Filter::kBspline3, "bspline3", 4},
-    {Filter::kBspline5, "bspline5", 6},
-    {Filter::kLanczos3, "lanczos3", 6},
-    {Filter::kLanczos6, "lanczos6", 12},
 }};
 
 using Weights = std::array<double, kMaxTaps>;
 
 // All take t, how far the position lies past its base tap: floor(u) for even tap counts, t in [0, 1); the nearest
 // sample for odd ones, t in [-1/2, 1/2).
-
-void catmull_rom_weights(double t, Weights& w) {
-  const double s = 1.0 - t;
-  w[0] = -0.5 * t * s * s;
-  w[1] = 1.0 + t * t * (1.5 * t - 2.5);
-  w[2] = 1.0 + s * s * (1.5 * s - 2.5);
-  w[3] = -0.5 * s * t * t;
-}
 
 /// A straight line and 4/3 of what Catmull-Rom adds to it: as much at the middle as the cubic spline of all samples
 /// would, to 0.02, by four of them. Exact on planes; 4/3 by measurement (docs/decisions/0027).
@@ -53,62 +39,12 @@ void limited_cubic_weights(double t, Weights& w) {
   w[3] = -after;
 }
 
-void bspline2_weights(double t, Weights& w) {
-  w[0] = 0.5 * (0.5 - t) * (0.5 - t);
-  w[1] = 0.75 - t * t;
-  w[2] = 0.5 * (0.5 + t) * (0.5 + t);
-}
-
 void bspline3_weights(double t, Weights& w) {
   const double s = 1.0 - t;
   w[0] = s * s * s / 6.0;
   w[1] = 2.0 / 3.0 - 0.5 * t * t * (1.0 + s);
   w[2] = 2.0 / 3.0 - 0.5 * s * s * (1.0 + t);
   w[3] = t * t * t / 6.0;
-}
-
-/// The quintic B-spline on its three pieces, 0 <= x <= 1, 2 and 3.
-double bspline5_inner(double x) {
-  const double x2 = x * x;
-  return 11.0 / 20.0 + x2 * (-0.5 + x2 * (0.25 - x / 12.0));
-}
-double bspline5_middle(double x) {
-  return 17.0 / 40.0 + x * (5.0 / 8.0 + x * (-7.0 / 4.0 + x * (5.0 / 4.0 + x * (-3.0 / 8.0 + x / 24.0))));
-}
-double bspline5_outer(double x) {
-  const double y = 3.0 - x;
-  const double y2 = y * y;
-  return y2 * y2 * y / 120.0;
-}
-
-void bspline5_weights(double t, Weights& w) {
-  const double s = 1.0 - t;
-  w[0] = bspline5_outer(2.0 + t);
-  w[1] = bspline5_middle(1.0 + t);
-  w[2] = bspline5_inner(t);
-  w[3] = bspline5_inner(s);
-  w[4] = bspline5_middle(1.0 + s);
-  w[5] = bspline5_outer(2.0 + s);
-}
-
-/// sinc(x) sinc(x / lobes) at the 2 lobes taps around the position, divided by their sum: a bare Lanczos kernel ripples
-/// by up to 1 % on level ground.
-void lanczos_weights(int lobes, double t, Weights& w) {
-  if (t == 0.0) {
-    w[static_cast<std::size_t>(lobes - 1)] = 1.0;
-    return;
-  }
-  const double sine = std::sin(std::numbers::pi * t);  // sin(pi x) at x = t - k is this with alternating sign
-  double sum = 0.0;
-  for (int i = 0; i < 2 * lobes; ++i) {
-    const int k = i - lobes + 1;  // tap's distance from the base tap
-    const double x = t - k;
-    const double sinc = ((k & 1) != 0 ? -sine : sine) / x;
-    const double window = std::sin(std::numbers::pi * x / lobes) / x;
-    w[static_cast<std::size_t>(i)] = sinc * window;  // times lobes / pi^2, which the division below takes out
-    sum += w[static_cast<std::size_t>(i)];
-  }
-  for (int i = 0; i < 2 * lobes; ++i) w[static_cast<std::size_t>(i)] /= sum;
 }
 
 /// Weights in double and the first tap.
@@ -130,23 +66,8 @@ std::int64_t weights_at(Filter filter, int taps, double u, Weights& w) {
     case Filter::kLimitedCubic:
       limited_cubic_weights(t, w);
       break;
-    case Filter::kCatmullRom:
-      catmull_rom_weights(t, w);
-      break;
-    case Filter::kBspline2:
-      bspline2_weights(t, w);
-      break;
     case Filter::kBspline3:
       bspline3_weights(t, w);
-      break;
-    case Filter::kBspline5:
-      bspline5_weights(t, w);
-      break;
-    case Filter::kLanczos3:
-      lanczos_weights(3, t, w);
-      break;
-    case Filter::kLanczos6:
-      lanczos_weights(6, t, w);
       break;
   }
   return static_cast<std::int64_t>(base) - (taps - 1) / 2;
@@ -176,8 +97,7 @@ std::string to_string(Edges edges) {
 }
 
 Edges usual_edges(Filter filter) {
-  const Kernel kernel = Kernel::make(filter, Edges::kOdd);
-  return kernel.taps() >= 4 && !kernel.is_limited() ? Edges::kHeld : Edges::kOdd;
+  return filter == Filter::kBspline3 ? Edges::kHeld : Edges::kOdd;
 }
 
 Edges edges_from_string(const std::string& text) {
@@ -188,16 +108,12 @@ Edges edges_from_string(const std::string& text) {
 }
 
 Kernel Kernel::make(Filter filter, Edges edges) {
-  require_known("filter", filter, Filter::kLanczos6);
+  require_known("filter", filter, Filter::kBspline3);
   int taps = 0;
   for (const FilterEntry& entry : kFilters) {
     if (entry.filter == filter) taps = entry.taps;
   }
   return {filter, taps, edges};
-}
-
-bool Kernel::interpolates() const {
-  return filter_ != Filter::kBspline2 && filter_ != Filter::kBspline3 && filter_ != Filter::kBspline5;
 }
 
 TapWeights Kernel::at(double u) const {

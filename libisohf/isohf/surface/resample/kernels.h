@@ -7,7 +7,7 @@
 
 namespace isohf {
 
-inline constexpr int kMaxTaps = 12;
+inline constexpr int kMaxTaps = 4;
 
 /// The part of a kernel that acts at one position: value(u) = sum over i < taps of weights[i] * c[first + i].
 /// The weights sum to 1 up to their rounding to float; those from `taps` on are 0.
@@ -18,8 +18,9 @@ struct TapWeights {
 
 /// A separable kernel, applied along columns and along rows; sample k lies at position u = k.
 ///
-/// The coefficients c are the samples themselves where interpolates() holds and the acquisition is a point, else the
-/// output of the matching Prefilter: a B-spline without its prefilter blurs.
+/// The coefficients c are the output of the matching Prefilter: a B-spline without its prefilter blurs. They are the
+/// samples themselves if the acquisition is a point and the kernel is 1 at 0 and 0 at all other integers, as all but
+/// the B-spline are.
 ///
 /// How to evaluate in two dimensions, with tap weights w[i] along the columns and v[j] along the rows:
 ///   1. Beyond the raster's true ends a tap reads what stands in there by edges() (continue_row). It is not a void.
@@ -30,7 +31,7 @@ struct TapWeights {
 ///      only to samples that are their own coefficients. But with four samples around the
 ///      point that are no voids, nothing is left out unless the rule is Edges::kMirror: the missing taps are continued
 ///      like those beyond the raster's ends, first along each row whose two middle taps are samples, then row by row.
-///   5. With Edges::kHeld and four taps or more, where a tap's sample is a void: of the four samples around the point
+///   5. With Edges::kHeld and four taps, where a tap's sample is a void: of the four samples around the point
 ///      those that are no voids, as the kernel reconstructs them, have a range; a value farther beyond it than a
 ///      quarter of it is moved to there.
 ///   6. Where is_limited(), a value beyond the range of the four samples around the point (of those that are no voids)
@@ -46,10 +47,8 @@ class Kernel {
   [[nodiscard]] Edges edges() const { return edges_; }
   /// Rule 6 above.
   [[nodiscard]] bool is_limited() const { return filter_ == Filter::kLimitedCubic; }
-  /// Number of coefficients that one position reads: 1, 2, 3, 4, 6 or 12.
+  /// Number of coefficients that one position reads: 1, 2 or 4.
   [[nodiscard]] int taps() const { return taps_; }
-  /// True where the kernel is 1 at 0 and 0 at all other integers, so that samples are their own coefficients.
-  [[nodiscard]] bool interpolates() const;
   /// The kernel vanishes for |x| >= support().
   [[nodiscard]] double support() const { return 0.5 * taps_; }
 

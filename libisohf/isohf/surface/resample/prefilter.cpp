@@ -12,6 +12,7 @@
 #include <map>
 #include <mutex>
 #include <numbers>
+#include <string>
 #include <tuple>
 #include <utility>
 
@@ -218,11 +219,10 @@ Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition, Edges e
   const Acquisition used = with_taps(acquisition);
   // A conversion asks several times for the same, and many conversions do: it takes longer than a small raster.
   static std::mutex mutex;
-  static std::map<std::tuple<Filter, Acquisition::Kind, double, Edges>, Prefilter> made;
+  static std::map<std::tuple<Filter, std::string, Edges>, Prefilter> made;
   constexpr std::size_t kMostMade = 16;
-  const std::tuple key(filter, acquisition.kind, acquisition.sigma, edges);
-  const bool is_kept = acquisition.kind != Acquisition::Kind::kFir;  // that of a file may change
-  if (is_kept) {
+  const std::tuple key(filter, to_string(acquisition), edges);
+  {
     const std::lock_guard lock(mutex);
     if (const auto found = made.find(key); found != made.end()) return found->second;
   }
@@ -276,11 +276,9 @@ Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition, Edges e
   }
   if (taps.size() == 1) taps[0] = 1.0;
   Prefilter prefilter(std::move(taps), (kernel.taps() + 1) / 2, worst_gain, edges);
-  if (is_kept) {
-    const std::lock_guard lock(mutex);
-    if (made.size() == kMostMade) made.clear();
-    made.emplace(key, prefilter);
-  }
+  const std::lock_guard lock(mutex);
+  if (made.size() == kMostMade) made.clear();
+  made.emplace(key, prefilter);
   return prefilter;
 }
 

@@ -13,7 +13,7 @@ namespace isohf {
 /// at the source's places returns the source (Unser and Aldroubi 1994: consistent sampling).
 ///
 /// Along each axis it is the inverse of the sequence a[k] = (phi * kernel)(k). For a point acquisition and a B-spline
-/// that is Unser's recursive prefilter; box and tent give the one of degree n + 1 and n + 2. Here it is applied as the
+/// that is Unser's recursive prefilter; a box gives the one of degree n + 1. Here it is applied as the
 /// inverse's impulse response p[k], symmetric and cut off where what is left out sums to less than 1e-9. Each
 /// coefficient so depends on halo() samples on either side and on nothing else: however the work is cut into bands or
 /// blocks, the bits are the same. Sums are double, in order of k, and rounded to float once for each axis.
@@ -44,7 +44,7 @@ class Prefilter {
 
   /// True where samples are their own coefficients; the functions below then only copy.
   [[nodiscard]] bool is_identity() const { return taps_.size() == 1; }
-  /// Samples on either side that one coefficient depends on: 0 for the identity, 20 for bspline3, 33 for bspline5.
+  /// Samples on either side that one coefficient depends on: 0 for the identity, 20 for bspline3.
   [[nodiscard]] int halo() const { return static_cast<int>(taps_.size()) - 1 + 2 * border_; }
   /// Places beyond a sample, into voids, that receive coefficients: half the kernel's taps; 0 for the identity.
   [[nodiscard]] int border() const { return border_; }

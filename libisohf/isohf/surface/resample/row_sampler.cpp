@@ -163,14 +163,8 @@ void gather_columns(int taps, const ColumnTaps& columns, const float* line, floa
       return vectorised<gather_columns<1>>(columns, line, out);
     case 2:
       return vectorised<gather_columns<2>>(columns, line, out);
-    case 3:
-      return vectorised<gather_columns<3>>(columns, line, out);
     case 4:
       return vectorised<gather_columns<4>>(columns, line, out);
-    case 6:
-      return vectorised<gather_columns<6>>(columns, line, out);
-    case 12:
-      return vectorised<gather_columns<12>>(columns, line, out);
     default:
       ISOHF_ASSERT(false);
   }

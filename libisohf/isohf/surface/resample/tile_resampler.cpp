@@ -137,15 +137,9 @@ float blend(int taps, const float* from, std::int64_t stride, const TapWeights& 
       return *from;
     case 2:
       return blend<2>(from, stride, columns, rows);
-    case 3:
-      return blend<3>(from, stride, columns, rows);
-    case 4:
-      return blend<4>(from, stride, columns, rows);
-    case 6:
-      return blend<6>(from, stride, columns, rows);
     default:
-      ISOHF_ASSERT(taps == 12);
-      return blend<12>(from, stride, columns, rows);
+      ISOHF_ASSERT(taps == 4);
+      return blend<4>(from, stride, columns, rows);
   }
 }
 

@@ -59,16 +59,14 @@ float VoidRule::at(double u, double v, const TapWeights& columns, const TapWeigh
 
 float VoidRule::held_near_samples(float height, const Taps& taps, const TapWeights& columns,
                                   const TapWeights& rows) const {
-  const int middle = kernel_.taps() / 2 - 1;
-  const int reach = kernel_.interpolates() ? 0 : middle;
   double least = std::numeric_limits<double>::infinity();
   double most = -least;
-  for (const int z : {middle, middle + 1}) {
-    for (const int x : {middle, middle + 1}) {
+  for (const int z : {1, 2}) {
+    for (const int x : {1, 2}) {
       if (is_void(columns.first + x, rows.first + z)) continue;
       double corner = 0.0;
-      for (int j = -reach; j <= reach; ++j) {
-        for (int i = -reach; i <= reach; ++i) {
+      for (int j = -1; j <= 1; ++j) {
+        for (int i = -1; i <= 1; ++i) {
           corner += kernel_.value(j) * kernel_.value(i) *
                     taps[static_cast<std::size_t>(z + j)][static_cast<std::size_t>(x + i)];
         }
@@ -83,33 +81,16 @@ float VoidRule::held_near_samples(float height, const Taps& taps, const TapWeigh
   return held_within(height, static_cast<float>(least - more), static_cast<float>(most + more));
 }
 
-/// Missing taps go on along each row whose middle two are there, then along each column: by distance from the middle,
-/// so that what a tap is mirrored from is there before it.
+/// Missing taps go on along each row whose middle two are there, then along each column.
 void VoidRule::complete(Taps& taps) const {
-  const auto count = static_cast<std::size_t>(kernel_.taps());
-  if (count % 2 != 0 || count < 4) return;
-  const std::size_t middle = count / 2 - 1;
-  const auto go_on = [&](auto tap) {
-    if (std::isnan(tap(middle)) || std::isnan(tap(middle + 1))) return;
-    std::size_t before = middle;
-    std::size_t after = middle + 1;
-    for (std::size_t distance = 1; distance <= middle; ++distance) {
-      const std::size_t left = middle - distance;
-      const std::size_t right = middle + 1 + distance;
-      if (std::isnan(tap(left))) {
-        tap(left) = 2.0 * tap(before) - tap(2 * before - left);
-      } else if (before == left + 1) {
-        before = left;
-      }
-      if (std::isnan(tap(right))) {
-        tap(right) = 2.0 * tap(after) - tap(2 * after - right);
-      } else if (after == right - 1) {
-        after = right;
-      }
-    }
+  if (kernel_.taps() != kMaxTaps) return;
+  const auto go_on = [](auto tap) {
+    if (std::isnan(tap(1)) || std::isnan(tap(2))) return;
+    if (std::isnan(tap(0))) tap(0) = 2.0 * tap(1) - tap(2);
+    if (std::isnan(tap(3))) tap(3) = 2.0 * tap(2) - tap(1);
   };
-  for (std::size_t j = 0; j < count; ++j) go_on([&](std::size_t i) -> double& { return taps[j][i]; });
-  for (std::size_t i = 0; i < count; ++i) go_on([&](std::size_t j) -> double& { return taps[j][i]; });
+  for (std::size_t j = 0; j < kMaxTaps; ++j) go_on([&](std::size_t i) -> double& { return taps[j][i]; });
+  for (std::size_t i = 0; i < kMaxTaps; ++i) go_on([&](std::size_t j) -> double& { return taps[j][i]; });
 }
 
 double VoidRule::coefficient(std::int64_t column, std::int64_t row) const {

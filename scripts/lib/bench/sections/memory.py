@@ -5,7 +5,7 @@ import re
 import struct
 
 # Conversions: archive, options.
-KINDS = {"bilinear": ["--filter", "bilinear"], "bspline5": ["--filter", "bspline5"],
+KINDS = {"bilinear": ["--filter", "bilinear"], "bspline3": ["--filter", "bspline3"],
          "with seeds": ["--filter", "bilinear", "--shadow-seeds"], "--lossless": ["--filter", "bilinear", "--lossless"],
          "--fill": ["--filter", "bilinear", "--nodata", "900", "--fill"],
          "--no-planes": ["--filter", "bilinear", "--no-planes"]}
@@ -17,8 +17,8 @@ READERS = {"restore": ("bilinear", ["restore", "IN", "OUT.npy"]),
            "export to .r16": ("bilinear", ["export", "IN", "OUT.r16"]),
            "export --tiles 8x1": ("bilinear", ["export", "IN", "OUT.r32", "--tiles", "8x1"]),
            "diff": ("bilinear", ["diff", "IN", "seeds"]),
-           "diff --surface": ("bilinear", ["diff", "IN", "bspline5", "--surface"]),
-           "diff --raster": ("bilinear", ["diff", "IN", "bspline5", "--raster", "OUT.npy"]),
+           "diff --surface": ("bilinear", ["diff", "IN", "bspline3", "--surface"]),
+           "diff --raster": ("bilinear", ["diff", "IN", "bspline3", "--raster", "OUT.npy"]),
            "verify": ("bilinear", ["verify", "IN"]),
            "verify, with seeds": ("with seeds", ["verify", "IN"]),
            "verify, --lossless": ("--lossless", ["verify", "IN"]),
@@ -82,7 +82,7 @@ def measure_size(bench, size, limit, found, rows):
     source = bench.terrain(size)
     archives = {kind: bench.work / f"memory_{i}.isohf" for i, kind in enumerate(KINDS)}
     output = bench.work / "memory_out"
-    words = {"SOURCE": source, "FULL": size, "seeds": archives["with seeds"], "bspline5": archives["bspline5"]}
+    words = {"SOURCE": source, "FULL": size, "seeds": archives["with seeds"], "bspline3": archives["bspline3"]}
     commands = {f"convert, {kind}": (["convert", source, "-o", archives[kind], *options, "--overwrite", "--quiet"],
                                      archives[kind], None) for kind, options in KINDS.items()}
     for name, (kind, command) in READERS.items():
