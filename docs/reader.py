@@ -399,7 +399,7 @@ class Surface:
         self.columns, self.rows = metadata["tile_shape"]["columns"], metadata["tile_shape"]["rows"]
         self.across, self.down = metadata["tiles"]["columns"], metadata["tiles"]["rows"]
         self.width, self.height = 512 * (self.columns - 4) * self.across, 512 * (self.rows - 3) * self.down
-        self.wraps, self.tiles = metadata.get("wraps_x"), tiles
+        self.wraps, self.tiles = metadata["wraps_x"], tiles
 
     def triangle(self, x, z):
         """P at a place, None where there is none."""
@@ -656,9 +656,9 @@ class Archive:
             self.data = file.read()
         self.read_directory()
         self.metadata = json.loads(self.member("isohf.json"))
-        require(self.metadata["format"] == "isohf" and self.metadata["version"] in (1, 2), "another version: not supported")
+        require(self.metadata["format"] == "isohf" and self.metadata["version"] == 2, "another version: not supported")
         require(not self.metadata.get("requires"), "requires what is not known: not supported")
-        raw_range = self.metadata["source"].get("voids", {}).get("raw_range") or (0, 0)
+        raw_range = self.metadata["source"]["voids"].get("raw_range") or (0, 0)
         require(float(raw_range[0]) <= float(raw_range[1]), "raw_range is not the smaller number first")
         self.shape, self.grid = self.metadata["tile_shape"], self.metadata["tiles"]
         self.kind, self.letter, self.void = KINDS[self.metadata["samples"]["type"]]
@@ -668,7 +668,7 @@ class Archive:
             tile = re.fullmatch(r"tiles/(0|[1-9]\d*)/(0|[1-9]\d*)\.tile", name)
             require(not name.startswith("tiles/") or tile and int(tile[1]) < self.grid["rows"] and int(tile[2]) < self.grid["columns"],
                     "no tile's name: " + name)
-        digests = {} if self.metadata["version"] == 1 else self.index() if "index.bin" in self.members else None
+        digests = self.index() if "index.bin" in self.members else None
         require(digests is not None or count <= 2 ** 22 // vertices + 64 * there, "a grid of more tiles than its members make likely")
         if digests is not None:  # else another tool packed it, and its data are others
             crcs = b"".join(struct.pack("<I", zlib.crc32(self.raw(name))) for name in self.members
@@ -732,7 +732,7 @@ class Archive:
         require(at == last, "the directory's entries do not fill it")
 
     def index(self):
-        """Digests of the stored tiles by flat index, out of index.bin of version 2, all of which is checked."""
+        """Digests of the stored tiles by flat index, out of index.bin, all of which is checked."""
         index, digests = self.member("index.bin"), {}
         magic, version, tables, size, stands, _, _, described, crc, zero, own = self.unpack("8sII4QIIII", len(index) - 64, index)
         require(magic == b"ISOHFIDX" and version == 2 and size == len(index) and not zero
@@ -816,7 +816,7 @@ class Archive:
         reach = 2 ** max(self.shape["levels"] - 1, planes["stride"].bit_length() - 1)
         for plane in range(1, planes["count"] + 1):
             F = planes["stride"] ** plane
-            joined = self.metadata.get("wraps_x") and across % F == 0
+            joined = self.metadata["wraps_x"] and across % F == 0
             for j, i in ((j, i) for j in range(-(-down // F)) for i in range(-(-across // F))):
                 expected = []
                 for r in range(rows):
@@ -938,7 +938,7 @@ class Archive:
             return struct.pack("<Bd", value is not None, value or 0.0)
 
         out += text(m["content_sha256"]) + text(m["units"]["horizontal"]) + text(m["units"]["vertical"])
-        out += struct.pack("<BB", bool(m.get("wraps_x")), bool(on))
+        out += struct.pack("<BB", bool(m["wraps_x"]), bool(on))
         if on:
             names = ("semi_major_axis_m", "inverse_flattening", "longitude_0", "latitude_0", "parallel_1", "parallel_2",
                      "scale_0", "false_easting", "false_northing")
@@ -997,8 +997,7 @@ def main(path, samples=None):
         archive.member(name)
     archive.read_tiles()
     require(archive.content_hash() == archive.metadata["content_sha256"], "another content hash")
-    if archive.metadata["version"] == 2:
-        require(archive.ground_hash() == archive.metadata["ground_sha256"], "another ground hash")
+    require(archive.ground_hash() == archive.metadata["ground_sha256"], "another ground hash")
     archive.check_planes()
     if "shadow_seeds" in archive.metadata and "part" not in archive.metadata:  # a part's tell of what isn't here
         archive.check_seeds()

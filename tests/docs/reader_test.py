@@ -1,4 +1,4 @@
-"""Runs docs/reader.py over the kept archives and over fresh ones of every kind. usage: reader_test.py ISOHF SOURCE_FOLDER"""
+"""Runs docs/reader.py over fresh archives of every kind. usage: reader_test.py ISOHF SOURCE_FOLDER"""
 
 import pathlib
 import subprocess
@@ -55,11 +55,5 @@ with tempfile.TemporaryDirectory() as name:
         found = read(archive, folder / "samples")
         if found.returncode != 0 or "samples" not in found.stdout:
             print(source.name, options, found.stdout, found.stderr)
-            failures += 1
-    for archive in sorted(data.glob("archives/*/*.isohf")):
-        found = read(archive)
-        # The first line comes when the content hash holds; predictions of old archives are refused in a line.
-        if "content" not in found.stdout or (found.returncode != 0 and "not supported" not in found.stderr):
-            print(archive.name, found.stdout, found.stderr)
             failures += 1
 sys.exit(failures != 0)

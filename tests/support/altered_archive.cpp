@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 #include <span>
 #include <stdexcept>
 #include <tuple>
@@ -11,8 +10,6 @@
 #include "isohf/archive/archive_index_builder.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
-#include "isohf/archive/tile_index.h"
-#include "isohf/base/bytes.h"
 #include "isohf/base/output_file.h"
 #include "support/temporary_folder.h"
 
@@ -24,30 +21,6 @@ std::vector<std::byte> bytes_of(const std::string& text) {
   return {bytes.begin(), bytes.end()};
 }
 
-template <typename T>
-void put(std::vector<std::byte>& out, std::size_t at, T value) {
-  std::memcpy(out.data() + at, &value, sizeof value);
-}
-
-/// The footer of version 1.
-void append_footer(std::vector<std::byte>& index, std::uint64_t stored, std::uint64_t entries,
-                   std::span<const std::byte> directory) {
-  const std::uint32_t records_crc = crc32(index);
-  const std::size_t start = index.size();
-  ByteWriter out(index);
-  out.write(std::uint64_t{0x58444946484f5349});
-  out.write(std::uint32_t{1});
-  out.write(std::uint32_t{kIndexRecordBytes});
-  out.write(std::uint64_t{start / kIndexRecordBytes});
-  out.write(stored);
-  out.write(entries);
-  out.write(std::uint64_t{directory.size()});
-  out.write(crc32(directory));
-  out.write(records_crc);
-  out.write(std::uint32_t{0});
-  out.write(crc32(std::span<const std::byte>(index).subspan(start)));
-}
-
 }  // namespace
 
 AlteredArchive::AlteredArchive(const std::string& path) : original_(path) {
@@ -57,10 +30,7 @@ AlteredArchive::AlteredArchive(const std::string& path) : original_(path) {
     const auto data = std::span(file).subspan(checked_data_offset(*source, *entry), entry->compressed_bytes);
     if (entry->name == kMetadataName) {
       metadata = nlohmann::json::parse(std::string(reinterpret_cast<const char*>(data.data()), data.size()));
-      tile_columns_ = metadata.at("tiles").at("columns").get<std::int64_t>();
-    } else if (entry->name == kIndexName) {
-      if (is_first_version()) records_.assign(data.begin(), data.end() - kIndexFooterBytes);
-    } else {
+    } else if (entry->name != kIndexName) {
       members_.push_back(
           {entry->name, entry->method == ZipMethod::kDeflated, entry->crc32, entry->bytes, {data.begin(), data.end()}});
     }
@@ -106,14 +76,6 @@ std::uint64_t AlteredArchive::compressed_bytes(const std::string& start) const {
   return bytes;
 }
 
-bool AlteredArchive::is_first_version() const {
-  return metadata.is_null() || metadata.at("version") == 1;
-}
-
-void AlteredArchive::write(const std::string& path) const {
-  is_first_version() ? write_first_version(path) : write_now(path);
-}
-
 nlohmann::json AlteredArchive::stated() const {
   nlohmann::json json = metadata;
   std::uint32_t data_crc = 0;
@@ -122,7 +84,7 @@ nlohmann::json AlteredArchive::stated() const {
   return json;
 }
 
-void AlteredArchive::write_now(const std::string& path) const {
+void AlteredArchive::write(const std::string& path) const {
   const ArchiveReader was(original_);
   OutputFile file(path, {.overwrite = true});
   ArchiveIndexBuilder contents(was.grid(), was.metadata().planes, folder_of(path));
@@ -160,43 +122,6 @@ void AlteredArchive::write_now(const std::string& path) const {
   append(member, json);
   contents.append_directory(index, member, file);
   file.commit();
-}
-
-void AlteredArchive::write_first_version(const std::string& path) const {
-  std::vector<std::byte> file;
-  std::vector<std::byte> directory;
-  const auto append = [&](const Member& member) {
-    const ZipMember entry{member.name,  member.deflated ? ZipMethod::kDeflated : ZipMethod::kStored,
-                          member.crc32, member.data.size(),
-                          member.bytes, file.size()};
-    append_local_header(entry, file);
-    const std::uint64_t at = file.size();
-    file.insert(file.end(), member.data.begin(), member.data.end());
-    append_directory_entry(entry, directory);
-    return at;
-  };
-  const std::vector<std::byte> json = bytes_of(stated().dump(1) + "\n");
-  append({kMetadataName, false, crc32(json), json.size(), json});
-  std::vector<std::byte> index = records_;
-  std::uint64_t stored = 0;
-  for (const Member& member : members_) {
-    const std::uint64_t at = append(member);
-    const auto tile = tile_from_name(member.name);
-    if (!tile) continue;
-    ++stored;
-    const auto record =
-        static_cast<std::size_t>(tile->tile.row * tile_columns_ + tile->tile.column) * kIndexRecordBytes;
-    put(index, record, at);
-    put(index, record + 8, static_cast<std::uint32_t>(member.data.size()));
-    put(index, record + 12, static_cast<std::uint32_t>(member.bytes));
-    put(index, record + 16, member.crc32);
-  }
-  append_footer(index, stored_count.value_or(stored), members_.size() + 1, directory);
-  append({kIndexName, false, crc32(index), index.size(), index});
-  const std::uint64_t directory_offset = file.size();
-  file.insert(file.end(), directory.begin(), directory.end());
-  append_end_records(members_.size() + 2, directory_offset, directory.size(), file);
-  write_file(path, file);
 }
 
 }  // namespace isohf::test

@@ -286,8 +286,7 @@ std::string describe_archive(const ArchiveReader& archive) {
   }
   say("vertices",
       fmt::format(
-          "{} {}, {} void{}", describe_count(statistics.vertices),
-          counts_source_ground(metadata) ? "on the source's ground" : "visible", describe_count(statistics.voids),
+          "{} on the source's ground, {} void{}", describe_count(statistics.vertices), describe_count(statistics.voids),
           statistics.clamped > 0 ? fmt::format(", {} moved into the range", describe_count(statistics.clamped)) : ""));
   say("source",
       fmt::format("{}: {}, {} x {} {}{}, registered as {}", source.name, source.format, source.width, source.height,

@@ -70,7 +70,7 @@ class ArchiveReader {
 
   /// The same from anything that reads a range of bytes; `name` is what messages call it. Opening reads the last 256
   /// KiB, and as much again where a longer directory stands there; pages of the index are read when they are asked for,
-  /// and some MiB of them kept, so that a tile mostly costs one range. Of version 1 the whole index is read and kept.
+  /// and some MiB of them kept, so that a tile mostly costs one range.
   ArchiveReader(std::shared_ptr<const ByteSource> source, const std::string& name);
   ~ArchiveReader();
   ArchiveReader(ArchiveReader&&) noexcept;
@@ -102,11 +102,11 @@ class ArchiveReader {
   /// metadata().plane_grid(plane). What is no tile of the plane's grid throws Error{kInvalidArgument}.
   [[nodiscard]] TileEntry tile_entry(TileIndex tile, int plane = 0) const;
   /// SHA-256 of the tile's elevations as the archive states it, without decoding any (docs/archive_format.md, "Content
-  /// hash"); nullopt where the archive states none: in version 1, and where it is read by the directory.
+  /// hash"); nullopt where the archive is read by the directory.
   [[nodiscard]] std::optional<std::array<std::byte, 32>> tile_digest(TileIndex tile, int plane = 0) const;
 
-  /// What there is of each kind of members, the tiles first, without a look at any of them. Of version 1, and where the
-  /// archive is read by the directory, all of it is gone through once.
+  /// What there is of each kind of members, the tiles first, without a look at any of them. Where the archive
+  /// is read by the directory, all of it is gone through once.
   [[nodiscard]] const std::vector<MemberTable>& tables() const;
   /// Members in none of tables(), in file order: the metadata, the index, and what other tools added.
   [[nodiscard]] const std::vector<MemberEntry>& loose_members() const;

@@ -126,8 +126,7 @@ struct PlaneInfo {
   friend bool operator==(const PlaneInfo&, const PlaneInfo&) = default;
 };
 
-/// The versions of the format that this build reads; it writes the last.
-inline constexpr int kOldestFormatVersion = 1;
+/// The version of the format that this build reads and writes.
 inline constexpr int kFormatVersion = 2;
 
 /// Everything about an archive but its elevations; its member isohf.json (docs/archive_format.md).
@@ -137,7 +136,6 @@ struct Metadata {
   /// The tiles of a plane: plane 0 is `grid`; those of a coarser one are fewer and wider. 0 <= plane <= planes.count.
   [[nodiscard]] TileGrid plane_grid(int plane) const;
 
-  int version = kFormatVersion;  ///< as it was read
   TileGrid grid;
   PlaneInfo planes;
   Quantisation quantisation;
@@ -162,7 +160,6 @@ struct Metadata {
   std::int64_t tiles_stored = 0;  ///< tiles that hold at least one elevation; the others are wholly void and absent
   std::string content_sha256;     ///< see docs/archive_format.md; independent of threads, level and codec
   /// Over content_sha256 and what says where on which ground it lies: lattice, units, projection, reference systems.
-  /// Empty in version 1.
   std::string ground_sha256;
   std::string producer;  ///< "isohf 0.1.0"
   /// JSON members that this build does not know or that a later section adds (shadow seeds, residuals, accuracy), as

@@ -43,7 +43,7 @@ struct PartSummary {
 /// Writes some tiles of an archive as one of their own. Tiles, their textures and their seeds are copied byte for byte,
 /// coarse planes are made anew; residual members belong to tiles of the first column, and come along with these (the
 /// samples come back once the parts are joined). Stage "tiles". Memory: a batch of tiles, and
-/// what planes need. Throws Error{kInvalidArgument} where `tiles` reach beyond the archive, where it is of version 1 or
+/// what planes need. Throws Error{kInvalidArgument} where `tiles` reach beyond the archive, where it was
 /// repacked by another tool, and where `output` exists without overwrite; Error{kCorrupt} for damage.
 PartSummary extract_tiles(const std::string& archive, const std::string& output, const TileRange& tiles,
                           const PartOptions& options = {}, const Job& job = {});
@@ -97,8 +97,8 @@ struct ArchiveDifference {
   [[nodiscard]] bool same_tiles() const { return why_other_lattice.empty() && tiles_differing == 0; }
 };
 
-/// Compares metadata, and tiles that both are to hold by their stored digests: none is decoded but those that have no digest (version 1), and
-/// with `surface` those that differ. Stage "compare". Memory is bounded.
+/// Compares metadata, and tiles that both are to hold by their stored digests: none is decoded but those that have no digest
+/// (repacked archives), and with `surface` those that differ. Stage "compare". Memory is bounded.
 [[nodiscard]] ArchiveDifference diff_archives(const std::string& first, const std::string& second, bool surface = false,
                                               const Job& job = {});
 

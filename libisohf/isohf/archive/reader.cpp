@@ -79,7 +79,7 @@ std::shared_ptr<const ByteSource> required(std::shared_ptr<const ByteSource> sou
 }  // namespace
 
 struct ArchiveReader::State {
-  State(std::shared_ptr<const ByteSource> bytes, const std::string& its_name, bool keeps_index);
+  State(std::shared_ptr<const ByteSource> bytes, const std::string& its_name);
 
   std::shared_ptr<const ByteSource> source;
   TailFirst file;
@@ -98,7 +98,7 @@ struct ArchiveReader::State {
   mutable std::once_flag tables_read;
   mutable std::vector<MemberTable> tables;
 
-  void open(bool keeps_index);
+  void open();
   /// A member's data, its local header held against what is stated, in one range.
   [[nodiscard]] SourceBytes checked_data(const ZipMember& member, std::uint64_t data_offset,
                                          std::size_t& header_bytes) const;
@@ -119,14 +119,14 @@ struct ArchiveReader::State {
   [[nodiscard]] std::optional<MemberEntry> find_in_tables(const std::string& wanted) const;
 };
 
-ArchiveReader::State::State(std::shared_ptr<const ByteSource> bytes, const std::string& its_name, bool keeps_index) try
+ArchiveReader::State::State(std::shared_ptr<const ByteSource> bytes, const std::string& its_name) try
     : source(std::move(bytes)), file(*source), name(its_name) {
-  open(keeps_index);
+  open();
 } catch (const Error& error) {
   throw error.within(its_name);
 }
 
-void ArchiveReader::State::open(bool keeps_index) {
+void ArchiveReader::State::open() {
   end = find_archive_end(file);
   file.fetch(end.directory_offset);
   own = find_own_entries(file, end);
@@ -149,7 +149,7 @@ void ArchiveReader::State::open(bool keeps_index) {
     throw error.within(fmt::format("at byte {}", entry.header_offset));
   }
   json.erase(json.find_last_not_of(" \n") + 1);
-  tiles.emplace(file, end, own, *metadata, keeps_index);
+  tiles.emplace(file, end, own, *metadata);
   if (tiles->by_directory()) {
     warnings.emplace_back("index and ZIP directory do not agree, as after repacking; tiles are found by the directory");
   }
@@ -258,11 +258,10 @@ std::optional<MemberEntry> ArchiveReader::State::find_in_tables(const std::strin
       wanted, entry.offset_bytes, entry.compressed_bytes, entry.payload_bytes, entry.payload_crc32, record->deflated};
 }
 
-ArchiveReader::ArchiveReader(const std::string& path)
-    : state_(std::make_unique<State>(open_file_source(path), path, false)) {}
+ArchiveReader::ArchiveReader(const std::string& path) : state_(std::make_unique<State>(open_file_source(path), path)) {}
 
 ArchiveReader::ArchiveReader(std::shared_ptr<const ByteSource> source, const std::string& name)
-    : state_(std::make_unique<State>(required(std::move(source), name), name, true)) {}
+    : state_(std::make_unique<State>(required(std::move(source), name), name)) {}
 
 ArchiveReader::ArchiveReader(ArchiveReader&&) noexcept = default;
 ArchiveReader::~ArchiveReader() = default;
@@ -449,8 +448,7 @@ std::vector<std::string> ArchiveReader::check_structure() const {
     if (!state.tiles->by_directory()) {
       state.tiles->check_against(directory, complain);
       // An archive to which another tool added something is held against the rules of ZIP alone.
-      if (state.own.are_last || metadata().version == 1)
-        check_profile(state.file, state.end, metadata().version, complain);
+      if (state.own.are_last) check_profile(state.file, state.end, complain);
     }
     for (const auto& [entry, data_offset] : directory.members) {
       check_member(state.file, entry, data_offset);

@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 
 #include "isohf/archive/codec/tile_payload.h"
 #include "isohf/archive/deflate/deflate.h"
-#include "isohf/archive/tile_index.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -34,10 +32,22 @@ std::string describe(TileIndex tile, int plane) {
 
 }  // namespace
 
-TileLocator::TileLocator(const ByteSource& file, const ZipEnd& end, const OwnEntries& own, const Metadata& metadata,
-                         bool keeps_index)
+void set_unknown_range(const Quantisation& quantisation, TileEntry& entry) {
+  const bool is_float = quantisation.type == CodeType::kF32;
+  entry.has_voids = true;
+  entry.code_min = is_float ? 0xff800000U : 0U;
+  entry.code_max = is_float ? 0x7f800000U : quantisation.max_code();
+}
+
+bool has_unknown_range(const Quantisation& quantisation, const TileEntry& entry) {
+  TileEntry unknown = entry;
+  set_unknown_range(quantisation, unknown);
+  return entry.has_voids && entry.code_min == unknown.code_min && entry.code_max == unknown.code_max;
+}
+
+TileLocator::TileLocator(const ByteSource& file, const ZipEnd& end, const OwnEntries& own, const Metadata& metadata)
     : file_(file), end_(end), metadata_(metadata), grids_(plane_grids(metadata)) {
-  if (!use_pages(own) && !use_index(keeps_index)) use_directory();
+  if (!use_pages(own)) use_directory();
 }
 
 /// The tables of the planes' tiles; empty where one is missing or of another grid.
@@ -53,7 +63,7 @@ std::vector<std::size_t> TileLocator::plane_tables(const PagedIndex& index) cons
   return tables;
 }
 
-/// Takes the index of version 2 where it stands as it was written.
+/// Takes the index where it stands as it was written.
 bool TileLocator::use_pages(const OwnEntries& own) {
   if (!own.index) return false;
   auto index = PagedIndex::open(file_, *own.index);
@@ -65,30 +75,7 @@ bool TileLocator::use_pages(const OwnEntries& own) {
   return true;
 }
 
-/// Takes the index of version 1 where it and the directory agree.
-bool TileLocator::use_index(bool keeps_index) {
-  const auto tiles = static_cast<std::uint64_t>(metadata_.grid.tile_count());
-  const std::uint64_t records_bytes = tiles * kIndexRecordBytes;
-  if (end_.directory_offset < records_bytes + kIndexFooterBytes) return false;
-  const std::uint64_t footer_offset = end_.directory_offset - kIndexFooterBytes;
-  const auto footer = parse_index_footer(SourceBytes(file_, footer_offset, kIndexFooterBytes).bytes());
-  if (!footer || footer->record_count != tiles || footer->directory_bytes >= end_.directory_bytes ||
-      footer->directory_entries + 1 != end_.entries) {
-    return false;
-  }
-  data_end_ = footer_offset - records_bytes;
-  SourceBytes kept;
-  if (keeps_index) kept = SourceBytes(file_, data_end_, records_bytes);
-  if ((keeps_index ? crc32(kept.bytes()) : crc32_in(file_, data_end_, records_bytes)) != footer->records_crc32)
-    return false;
-  if (crc32_in(file_, end_.directory_offset, footer->directory_bytes) != footer->directory_crc32) return false;
-  index_ = std::move(kept);
-  stored_count_ = footer->stored_count;
-  return true;
-}
-
 void TileLocator::use_directory() {
-  by_directory_ = true;
   data_end_ = end_.directory_offset;
   const ArchiveDirectory directory =
       read_directory(file_, end_, grids_, [](const std::string& what) { throw Error(ErrorCode::kCorrupt, what); });
@@ -113,32 +100,23 @@ void TileLocator::use_directory() {
 void TileLocator::take_ranges_from_index(const ArchiveDirectory& directory) {
   const auto member = std::find_if(directory.members.begin(), directory.members.end(),
                                    [](const ArchiveDirectory::Member& m) { return m.entry.name == kIndexName; });
-  const auto tiles = static_cast<std::uint64_t>(metadata_.grid.tile_count());
-  const bool is_first_version =
-      member != directory.members.end() && member->entry.bytes == tiles * kIndexRecordBytes + kIndexFooterBytes;
   std::vector<std::byte> old;
   try {
     if (member != directory.members.end()) old = member_from(file_, member->entry, member->data_offset);
   } catch (const Error&) {
     // Tiles are read without it.
   }
-  if (!is_first_version) {
-    if (!old.empty() && take_ranges_from_pages(std::move(old))) return;
-    // Without an index as large, the metadata's word alone stands for the grid: going through it must have an end.
-    const auto vertices = static_cast<std::uint64_t>(metadata_.grid.shape().stored_vertex_count());
-    if (tiles <= kMostVerticesOnTrust / vertices + kMostTilesOnTrust * listed_.size()) return;
-    throw Error(ErrorCode::kCorrupt,
-                fmt::format("metadata: tiles: {}x{} are stated, {} are there, and no index of as many",
-                            metadata_.grid.tile_columns(), metadata_.grid.tile_rows(), listed_.size()));
-  }
-  for (Listed& tile : listed_) {
-    if (old.empty() || tile.plane != 0) continue;
-    const auto at = static_cast<std::size_t>(tile.flat) * kIndexRecordBytes;
-    take_range(parse_index_record(std::span(old).subspan(at, kIndexRecordBytes)), tile.entry);
-  }
+  if (!old.empty() && take_ranges_from_pages(std::move(old))) return;
+  // Without an index as large, the metadata's word alone stands for the grid: going through it must have an end.
+  const auto tiles = static_cast<std::uint64_t>(metadata_.grid.tile_count());
+  const auto vertices = static_cast<std::uint64_t>(metadata_.grid.shape().stored_vertex_count());
+  if (tiles <= kMostVerticesOnTrust / vertices + kMostTilesOnTrust * listed_.size()) return;
+  throw Error(ErrorCode::kCorrupt,
+              fmt::format("metadata: tiles: {}x{} are stated, {} are there, and no index of as many",
+                          metadata_.grid.tile_columns(), metadata_.grid.tile_rows(), listed_.size()));
 }
 
-/// The same of an index of version 2; false where it is none of this grid.
+/// False where those bytes are no index of this grid.
 bool TileLocator::take_ranges_from_pages(std::vector<std::byte> old) {
   const auto bytes = memory_source(std::move(old));
   const auto index = PagedIndex::open_moved(*bytes);
@@ -169,29 +147,8 @@ TileEntry TileLocator::record(TileIndex tile, int plane) const {
     const auto found = paged_->record(plane_tables_[static_cast<std::size_t>(plane)], tile.row, tile.column);
     return found ? found->entry : TileEntry{};
   }
-  const std::int64_t flat = grids_[static_cast<std::size_t>(plane)].flat_index(tile);
-  if (!by_directory_) return indexed(flat);
-  const Listed* const listed = find_listed(flat, plane);
+  const Listed* const listed = find_listed(grids_[static_cast<std::size_t>(plane)].flat_index(tile), plane);
   return listed == nullptr ? TileEntry{} : listed->entry;
-}
-
-/// A record of version 1.
-TileEntry TileLocator::indexed(std::int64_t flat) const {
-  const std::uint64_t at = static_cast<std::uint64_t>(flat) * kIndexRecordBytes;
-  std::array<std::byte, kIndexRecordBytes> bytes{};
-  const auto kept = index_.bytes();
-  if (kept.empty()) {
-    read_exactly(file_, data_end_ + at, bytes);
-  } else {
-    std::copy_n(kept.begin() + static_cast<std::ptrdiff_t>(at), bytes.size(), bytes.begin());
-  }
-  const auto entry = parse_index_record(bytes);
-  if (!entry) {
-    throw Error(ErrorCode::kCorrupt,
-                fmt::format("member \"{}\" at byte {}: the record of tile {} has reserved bits set", kIndexName,
-                            data_end_ + at, flat));
-  }
-  return *entry;
 }
 
 TileEntry TileLocator::checked_record(TileIndex tile, int plane) const {
@@ -211,7 +168,7 @@ TileEntry TileLocator::checked_record(TileIndex tile, int plane) const {
 }
 
 bool TileLocator::is_deflated(TileIndex tile, int plane) const {
-  return !by_directory_ || find_listed(grids_[static_cast<std::size_t>(plane)].flat_index(tile), plane)->deflated;
+  return paged_ || find_listed(grids_[static_cast<std::size_t>(plane)].flat_index(tile), plane)->deflated;
 }
 
 std::optional<Digest> TileLocator::digest(TileIndex tile, int plane) const {
@@ -239,7 +196,7 @@ std::vector<MemberTable> TileLocator::tile_tables() const {
   return tables;
 }
 
-void TileLocator::check_pages(const ArchiveDirectory& directory, const Complain& complain) const {
+void TileLocator::check_against(const ArchiveDirectory& directory, const Complain& complain) const {
   struct Member {
     std::uint64_t flat;
     const ZipEntry* entry;
@@ -290,33 +247,6 @@ void TileLocator::check_pages(const ArchiveDirectory& directory, const Complain&
         },
         complain);
     for (; listed != members[table].end(); ++listed) not_indexed(*listed);
-  }
-}
-
-void TileLocator::check_against(const ArchiveDirectory& directory, const Complain& complain) const {
-  if (paged_) return check_pages(directory, complain);
-  auto tile = directory.tiles.begin();
-  std::uint64_t stored = 0;
-  for (std::int64_t flat = 0; flat < metadata_.grid.tile_count(); ++flat) {
-    const TileIndex index = metadata_.grid.tile_at(flat);
-    const TileEntry entry = indexed(flat);
-    const bool is_listed = tile != directory.tiles.end() && tile->flat == flat;
-    stored += entry.stored ? 1 : 0;
-    if (entry.stored != is_listed) {
-      complain(fmt::format(
-          "tile ({},{}): {}", index.column, index.row,
-          is_listed ? "the directory has it, the index has not" : "the index has it, the directory has not"));
-    } else if (is_listed &&
-               (entry.offset_bytes != tile->data_offset || entry.compressed_bytes != tile->entry.compressed_bytes ||
-                entry.payload_bytes != tile->entry.bytes || entry.payload_crc32 != tile->entry.crc32)) {
-      complain(fmt::format("tile ({},{}) at byte {}: index and directory do not agree", index.column, index.row,
-                           tile->data_offset));
-    }
-    while (tile != directory.tiles.end() && tile->flat == flat) ++tile;
-  }
-  if (stored != stored_count_) {
-    complain(fmt::format("member \"{}\": its footer counts {} stored tiles, its records {}", kIndexName, stored_count_,
-                         stored));
   }
 }
 

@@ -15,16 +15,18 @@
 
 namespace isohf {
 
+/// A range that no index states and nobody knows without decoding, as of repacked archives: voids, and the widest range.
+void set_unknown_range(const Quantisation& quantisation, TileEntry& entry);
+[[nodiscard]] bool has_unknown_range(const Quantisation& quantisation, const TileEntry& entry);
+
 /// Where the members of an archive stand: as its index says, or the ZIP directory where the two do not agree.
 class TileLocator {
  public:
-  /// file, metadata  must outlive it    keeps_index  whether an index of version 1 stays in memory, 32 bytes a tile; else
-  /// each tile's record is read when it is asked for. Throws Error{kCorrupt, kUnsupported} where neither can be used.
-  TileLocator(const ByteSource& file, const ZipEnd& end, const OwnEntries& own, const Metadata& metadata,
-              bool keeps_index);
+  /// file, metadata  must outlive it. Throws Error{kCorrupt, kUnsupported} where neither can be used.
+  TileLocator(const ByteSource& file, const ZipEnd& end, const OwnEntries& own, const Metadata& metadata);
 
-  [[nodiscard]] bool by_directory() const { return by_directory_; }
-  /// The index of version 2, where it is used.
+  [[nodiscard]] bool by_directory() const { return paged_ == nullptr; }
+  /// The index, where it is used.
   [[nodiscard]] const PagedIndex* paged() const { return paged_.get(); }
   [[nodiscard]] std::span<const TileGrid> grids() const { return grids_; }  ///< by plane
 
@@ -36,7 +38,7 @@ class TileLocator {
   /// The tables of the tiles, counted one by one where paged() does not know them.
   [[nodiscard]] std::vector<MemberTable> tile_tables() const;
 
-  /// Holds the index against a directory: one line for each member that they do not agree on.
+  /// Compares the index with a directory: one line for each member that they do not agree on. Not with by_directory().
   void check_against(const ArchiveDirectory& directory, const Complain& complain) const;
 
  private:
@@ -49,27 +51,21 @@ class TileLocator {
   };
 
   [[nodiscard]] bool use_pages(const OwnEntries& own);
-  [[nodiscard]] bool use_index(bool keeps_index);
   void use_directory();
   void take_ranges_from_index(const ArchiveDirectory& directory);
   [[nodiscard]] bool take_ranges_from_pages(std::vector<std::byte> old);
   [[nodiscard]] std::vector<std::size_t> plane_tables(const PagedIndex& index) const;
   [[nodiscard]] const Listed* find_listed(std::int64_t flat, int plane) const;
   [[nodiscard]] TileEntry record(TileIndex tile, int plane) const;
-  [[nodiscard]] TileEntry indexed(std::int64_t flat) const;
-  void check_pages(const ArchiveDirectory& directory, const Complain& complain) const;
 
   const ByteSource& file_;
   ZipEnd end_;
   const Metadata& metadata_;
   std::vector<TileGrid> grids_;
-  bool by_directory_ = false;
   std::unique_ptr<PagedIndex> paged_;
   std::vector<std::size_t> plane_tables_;  ///< with `paged_`: the table of each plane
-  SourceBytes index_;                      ///< of version 1: its records, where they are kept
-  std::vector<Listed> listed_;             ///< with `by_directory_`: its tiles, by plane and flat index
-  std::uint64_t stored_count_ = 0;         ///< of version 1: as the index's footer has it
-  std::uint64_t data_end_ = 0;             ///< tiles lie before it; without `by_directory_` the index begins there
+  std::vector<Listed> listed_;             ///< with by_directory(): its tiles, by plane and flat index
+  std::uint64_t data_end_ = 0;             ///< tiles lie before it; without by_directory() the index begins there
 };
 
 }  // namespace isohf

@@ -46,18 +46,15 @@ std::int64_t last_within(double length, double sigma) {
 
 }  // namespace
 
-bool counts_source_ground(const Metadata& metadata) {
+void check_statistics_of(const Metadata& metadata) {
   for (const auto& [name, text] : metadata.extensions) {
-    if (name != kStatisticsOfName) continue;
-    if (text == kStatisticsOfSource) return true;
+    if (name != kStatisticsOfName || text == kStatisticsOfSource) continue;
     throw Error(ErrorCode::kCorrupt, fmt::format("metadata: {} is {}, must be {}", name, text, kStatisticsOfSource));
   }
-  return false;
 }
 
 CountedVertices::CountedVertices(const Metadata& metadata)
     : grid_(metadata.grid),
-      all_(!counts_source_ground(metadata)),
       wraps_x_(metadata.wraps_x),
       last_x_(last_within(metadata.valid.x1, grid_.sigma_x())),
       last_z_(last_within(metadata.valid.z1, grid_.sigma_z())) {}
@@ -65,7 +62,6 @@ CountedVertices::CountedVertices(const Metadata& metadata)
 CountedVertices::Columns CountedVertices::of_row(TileIndex tile, int row) const {
   const TileShape& shape = grid_.shape();
   Columns columns{1, shape.columns() - (row % 2 == 0 ? 2 : 3)};
-  if (all_) return columns;
   if ((row == 1 && tile.row > 0) || grid_.lattice_vertex(tile, {1, row}).z > last_z_) return {1, 0};
   if (tile.column > 0 || wraps_x_) columns.first = 2;
   while (columns.last >= columns.first && grid_.lattice_vertex(tile, {columns.last, row}).x > last_x_) --columns.last;

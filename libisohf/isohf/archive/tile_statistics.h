@@ -8,15 +8,14 @@ namespace isohf {
 inline constexpr const char* kStatisticsOfName = "statistics_of";
 inline constexpr const char* kStatisticsOfSource = "\"source ground\"";
 
-/// Whether statistics are of the source's ground. Throws Error{kCorrupt} for another value of the member.
-[[nodiscard]] bool counts_source_ground(const Metadata& metadata);
+/// Throws Error{kCorrupt} for another value of the member.
+void check_statistics_of(const Metadata& metadata);
 
 /// Which of a tile's vertices statistics count: those on the source's ground, Metadata::valid, where a vertex that
-/// tiles share counts in the North-West one of them. In archives without the member above every tile's visible vertices
-/// count.
+/// tiles share counts in the North-West one of them.
 class CountedVertices {
  public:
-  /// metadata  grid, valid, wraps_x and the member above are looked at. Throws as counts_source_ground().
+  /// metadata  grid, valid and wraps_x are used
   explicit CountedVertices(const Metadata& metadata);
 
   /// Columns of a tile's row; none where last < first.
@@ -29,7 +28,6 @@ class CountedVertices {
 
  private:
   TileGrid grid_;
-  bool all_;
   bool wraps_x_;
   std::int64_t last_x_;  ///< on the lattice, of the source's ground
   std::int64_t last_z_;

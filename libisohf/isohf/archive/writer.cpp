@@ -540,7 +540,6 @@ void ArchiveWriter::complete(Metadata metadata) {
     if (state.members_end != 0) state.part.truncate(state.members_end);
   });
   state.members_end = state.part.position();
-  metadata.version = kFormatVersion;
   metadata.planes = state.options.planes;
   metadata.tiles_stored = state.contents.tiles_stored();
   metadata.content_sha256 = state.content_hash;

@@ -7,7 +7,7 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/metadata/part_record.h"
 #include "isohf/archive/planes/archive_planes.h"
-#include "isohf/archive/tile_index.h"
+#include "isohf/archive/tile_locator.h"
 #include "isohf/error.h"
 #include "isohf/verify.h"
 

@@ -20,7 +20,7 @@
 #include "isohf/archive/metadata/part_record.h"
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/planes/plane_builder.h"
-#include "isohf/archive/tile_index.h"
+#include "isohf/archive/tile_locator.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/memory/memory_budget.h"
@@ -530,7 +530,7 @@ class Verification {
       add(make(finding::kContentHash, {},
                fmt::format("content hash is {}, the metadata says {}", hash, metadata.content_sha256)));
     }
-    if (const std::string hash = ground_hash(metadata); metadata.version >= 2 && hash != metadata.ground_sha256) {
+    if (const std::string hash = ground_hash(metadata); hash != metadata.ground_sha256) {
       add(make(finding::kContentHash, {},
                fmt::format("ground hash is {}, the metadata says {}", hash, metadata.ground_sha256)));
     }
@@ -588,7 +588,7 @@ VerifyReport verify_archive(const std::string& path, const Job& job, std::size_t
   std::unique_ptr<ArchiveReader> archive;
   try {
     archive = std::make_unique<ArchiveReader>(path);
-    (void)counts_source_ground(archive->metadata());
+    check_statistics_of(archive->metadata());
     (void)part_record(archive->metadata());  // what cannot be understood is found before anything is counted
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kIo) throw;

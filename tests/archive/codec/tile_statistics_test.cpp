@@ -15,7 +15,6 @@ namespace {
 Metadata metadata(double x1, double z1, CodeType type) {
   Metadata made(TileGrid::make(TileShape::make(12, 11, 1), 3, 2, 8.0, 8.0));
   made.valid = {0.0, 0.0, x1, z1};
-  made.extensions.emplace_back(kStatisticsOfName, kStatisticsOfSource);
   made.quantisation = type == CodeType::kF32 ? Quantisation{type, 0.0, 1.0} : Quantisation{type, 10.0, 0.5};
   return made;
 }
@@ -95,12 +94,6 @@ TEST(TileStatistics, TheEdgeOfAJoinedGlobeCountsOnce) {
   const std::int64_t open = all_tiles(globe).vertices;
   globe.wraps_x = true;
   EXPECT_EQ(all_tiles(globe).vertices, open - 17) << "the first column of all rows is the last one";
-}
-
-TEST(TileStatistics, OlderArchivesCountWhatEachTileShows) {
-  Metadata older = metadata(19.3, 11.9, CodeType::kU16);
-  older.extensions.clear();
-  EXPECT_EQ(all_tiles(older).vertices, 6 * older.grid.shape().visible_vertex_count());
 }
 
 }  // namespace

@@ -232,19 +232,5 @@ TEST_F(VerifyAgainst, TakesWhatWasCutFromACoarsePlane) {
   }
 }
 
-TEST_F(VerifyAgainst, ArchivesWithoutARecordOfOptionsAreReadAsTheirSource) {
-  // Made by isohf 0.1.0, which recorded no options.
-  const std::string kept = ISOHF_SOURCE_DIR "/testdata/archives/v1/";
-  const std::string data = ISOHF_SOURCE_DIR "/testdata/";
-  for (const auto& [archive, input] :
-       std::vector<std::pair<std::string, std::string>>{{"codes.isohf", "coast_512x384_int16.tif"},
-                                                        {"bytes.isohf", "peaks_256x256_uint16.png"},
-                                                        {"floats.isohf", "ridges_161x161_float.exr"},
-                                                        {"lossless.isohf", "voids_200x150_int16.tif"}}) {
-    const RunResult verified = run_isohf({"verify", kept + archive, "--against", data + input});
-    EXPECT_EQ(verified.exit_code, 0) << archive << verified.out << verified.err;
-  }
-}
-
 }  // namespace
 }  // namespace isohf::test

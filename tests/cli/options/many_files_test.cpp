@@ -20,7 +20,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using Words = std::vector<std::string>;
 
-const std::string kKept = ISOHF_SOURCE_DIR "/testdata/archives/v1/";
+const std::string kKept = ISOHF_SOURCE_DIR "/testdata/conformance/good/";
 const std::string kRaster = ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif";
 
 std::vector<json> lines_of(const std::string& text) {
@@ -34,8 +34,8 @@ class ManyFiles : public testing::Test {
  protected:
   ManyFiles() {
     std::filesystem::create_directories(folder / "in/deeper");
-    std::filesystem::copy(kKept + "bytes.isohf", folder / "in/a.isohf");
-    std::filesystem::copy(kKept + "globe.isohf", folder / "in/deeper/c.isohf");
+    std::filesystem::copy(kKept + "u8.isohf", folder / "in/a.isohf");
+    std::filesystem::copy(kKept + "u16-globe-lossless.isohf", folder / "in/deeper/c.isohf");
     std::filesystem::copy(kRaster, folder / "in/b.tif");
   }
 
@@ -43,17 +43,18 @@ class ManyFiles : public testing::Test {
 };
 
 TEST_F(ManyFiles, AreVerifiedInOrderAndTheBadOneStopsNoOther) {
-  std::string damaged = read_file(kKept + "codes.isohf");
+  std::string damaged = read_file(kKept + "u16.isohf");
   damaged[damaged.size() / 2] ^= 1;
   write_file(folder / "damaged.isohf", damaged);
-  const Words files = {kKept + "globe.isohf", folder / "none.isohf", folder / "damaged.isohf", kKept + "bytes.isohf"};
+  const Words files = {kKept + "u16-globe-lossless.isohf", folder / "none.isohf", folder / "damaged.isohf",
+                       kKept + "u8.isohf"};
   Words command = {"verify"};
   command.insert(command.end(), files.begin(), files.end());
   const RunResult text = run_isohf(command);
   EXPECT_EQ(text.exit_code, 1);  // one could not be checked at all, which is worse than differences
-  EXPECT_THAT(text.out, testing::AllOf(HasSubstr("globe.isohf: passed"), HasSubstr("damaged.isohf: FAILED"),
-                                       HasSubstr("bytes.isohf: passed")));
-  EXPECT_LT(text.out.find("globe.isohf"), text.out.find("bytes.isohf"));
+  EXPECT_THAT(text.out, testing::AllOf(HasSubstr("u16-globe-lossless.isohf: passed"),
+                                       HasSubstr("damaged.isohf: FAILED"), HasSubstr("u8.isohf: passed")));
+  EXPECT_LT(text.out.find("u16-globe-lossless.isohf"), text.out.find("u8.isohf"));
   EXPECT_THAT(text.err, HasSubstr("none.isohf: "));
   EXPECT_THAT(text.err, HasSubstr("isohf: verify: 4 files: 2 done, 1 with differences, 1 failed\n"));
 

@@ -131,8 +131,8 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(0, "info", {"info", degrees});
   documents.run(0, "info-line", {"info", a, peaks, degrees});
   documents.run(1, "info-line", {"info", a, folder / "bad.isohf", folder / "none.tif"});
-  for (const char* old : {"codes", "floats", "globe", "lossless", "projected", "textured"}) {
-    documents.run(0, "info", {"info", kData + "archives/v1/" + old + ".isohf"});
+  for (const char* good : {"u16", "f32", "u16-globe-lossless", "seeds-hulls", "projected-lossless", "textures-png"}) {
+    documents.run(0, "info", {"info", kData + "conformance/good/" + good + ".isohf"});
   }
   documents.run(2, "info-line", {"info", a, b, "--level", "3"});
   documents.run(1, "error", {"info", folder / "bad.isohf"});

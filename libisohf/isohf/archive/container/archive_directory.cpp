@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <utility>
 
@@ -236,15 +237,8 @@ OwnEntries find_own_entries(const ByteSource& file, const ZipEnd& end) {
     found.are_last = found.index.has_value();
     if (found.are_last) return found;
   }
-  ZipEntries all(file, end);
-  auto entry = all.next();
-  bool has_metadata = entry && entry->name == kMetadataName;
-  if (has_metadata) {  // version 1: the metadata first, the index last
-    found.metadata = *entry;
-    found.index = entry_at_end(end.directory_bytes, kIndexName);
-    if (found.index) return found;
-  }
-  for (; entry; entry = all.next()) {
+  bool has_metadata = false;
+  for (ZipEntries all(file, end); const auto entry = all.next();) {
     if (entry->name == kIndexName) found.index = *entry;
     if (entry->name != kMetadataName || has_metadata) continue;
     found.metadata = *entry;
@@ -257,7 +251,7 @@ OwnEntries find_own_entries(const ByteSource& file, const ZipEnd& end) {
   return found;
 }
 
-void check_profile(const ByteSource& file, const ZipEnd& end, int version, const Complain& complain) {
+void check_profile(const ByteSource& file, const ZipEnd& end, const Complain& complain) {
   std::vector<std::byte> ours;
   const auto stands_at = [&](std::uint64_t offset) {
     if (offset > file.size_bytes() || ours.size() > file.size_bytes() - offset) return false;
@@ -265,10 +259,8 @@ void check_profile(const ByteSource& file, const ZipEnd& end, int version, const
     return std::equal(ours.begin(), ours.end(), theirs.bytes().begin());
   };
   const std::uint32_t media_type_crc = crc32(std::as_bytes(std::span(kMediaType)));
-  using Places = std::vector<std::pair<std::uint64_t, std::string_view>>;
-  const Places places =
-      version == 1 ? Places{{0, kMetadataName}, {end.entries - 1, kIndexName}}
-                   : Places{{0, kMediaTypeName}, {end.entries - 2, kIndexName}, {end.entries - 1, kMetadataName}};
+  const std::array<std::pair<std::uint64_t, std::string_view>, 3> places = {
+      {{0, kMediaTypeName}, {end.entries - 2, kIndexName}, {end.entries - 1, kMetadataName}}};
   std::uint64_t offset = 0;
   std::uint64_t entries = 0;
   for (ZipEntries all(file, end); const auto entry = all.next(); ++entries) {
@@ -302,6 +294,9 @@ void check_profile(const ByteSource& file, const ZipEnd& end, int version, const
   }
 }
 
+namespace {
+
+/// CRC-32 of a range, read in pieces.
 std::uint32_t crc32_in(const ByteSource& file, std::uint64_t offset_bytes, std::uint64_t size_bytes) {
   std::vector<std::byte> piece(std::min(size_bytes, std::uint64_t{1} << 20U));
   std::uint32_t crc = 0;
@@ -312,6 +307,8 @@ std::uint32_t crc32_in(const ByteSource& file, std::uint64_t offset_bytes, std::
   }
   return crc;
 }
+
+}  // namespace
 
 std::uint32_t data_crc32(const ByteSource& file, const std::string& name) try {
   std::uint32_t all = 0;

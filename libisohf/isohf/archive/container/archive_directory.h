@@ -18,7 +18,7 @@ namespace isohf {
 
 inline constexpr const char* kMetadataName = "isohf.json";
 inline constexpr const char* kIndexName = "index.bin";
-/// The first member from version 2 on, stored, and what it holds.
+/// The first member, stored, and what it holds.
 inline constexpr const char* kMediaTypeName = "mimetype";
 inline constexpr std::string_view kMediaType = "application/vnd.isohf+zip";
 
@@ -69,15 +69,14 @@ using Complain = std::function<void(const std::string&)>;
                                               std::span<const TileGrid> grids, const Complain& complain);
 
 /// Holds an archive of ours against the profile beyond what makes a ZIP file: the directory in file order and as the
-/// writer of that version makes it, members back to back from byte 0 on; in version 1 the metadata first and the index
-/// last, in version 2 the media type first, index and metadata last.
-void check_profile(const ByteSource& file, const ZipEnd& end, int version, const Complain& complain);
+/// writer makes it, members back to back from byte 0 on, the media type first, index and metadata last.
+void check_profile(const ByteSource& file, const ZipEnd& end, const Complain& complain);
 
 /// The entries of index and metadata, by which an archive is opened.
 struct OwnEntries {
   std::optional<ZipEntry> index;
   ZipEntry metadata;
-  bool are_last = false;  ///< as a writer of version 2 leaves them; else the directory was searched
+  bool are_last = false;  ///< as a writer leaves them; else the directory was searched
 };
 /// Looks at the directory's end, or else goes through it. Throws Error{kCorrupt} where there are no metadata.
 [[nodiscard]] OwnEntries find_own_entries(const ByteSource& file, const ZipEnd& end);
@@ -97,9 +96,6 @@ inline constexpr std::uint64_t kInflatedAtOnceBytes = std::uint64_t{16} << 20U;
 /// Checks what member_from checks, and of a member looked through in pieces also that zlib reads it and that its idle
 /// bits are 0.
 void check_member(const ByteSource& file, const ZipEntry& entry, std::uint64_t data_offset);
-
-/// CRC-32 of a range, read in pieces.
-[[nodiscard]] std::uint32_t crc32_in(const ByteSource& file, std::uint64_t offset_bytes, std::uint64_t size_bytes);
 
 /// CRC-32 over the CRC-32s of the data of all members before the index as they stand in the file, in the directory's
 /// order, but those of the metadata. Throws as reading does, with the name.

@@ -8,7 +8,6 @@
 #include <cstring>
 
 #include "isohf/archive/deflate/deflate.h"
-#include "isohf/archive/tile_index.h"
 #include "isohf/base/bytes.h"
 
 namespace isohf {
@@ -92,7 +91,14 @@ void append_record(const TableRecord& record, std::vector<std::byte>& out) {
 std::optional<TableRecord> parse_record(std::span<const std::byte> bytes) {
   TableRecord record;
   TileEntry& entry = record.entry;
-  const std::uint32_t flags = read_record(bytes, entry);
+  ByteReader reader(bytes);
+  entry.offset_bytes = reader.read<std::uint64_t>();
+  entry.compressed_bytes = reader.read<std::uint32_t>();
+  entry.payload_bytes = reader.read<std::uint32_t>();
+  entry.payload_crc32 = reader.read<std::uint32_t>();
+  entry.code_min = reader.read<std::uint32_t>();
+  entry.code_max = reader.read<std::uint32_t>();
+  const auto flags = reader.read<std::uint32_t>();
   entry.stored = true;
   entry.has_voids = (flags & kHasVoids) != 0;
   record.deflated = (flags & kNotDeflated) == 0;

@@ -11,7 +11,7 @@
 
 #include "isohf/archive.h"
 
-/// The member index.bin of version 2: tables of records in pages, their roots, the tables' descriptions, a footer
+/// The member index.bin: tables of records in pages, their roots, the tables' descriptions, a footer
 /// (docs/archive_format.md, "Index"). What stands here says how each of these reads in bytes.
 
 namespace isohf {

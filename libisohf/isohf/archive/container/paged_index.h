@@ -15,7 +15,7 @@
 
 namespace isohf {
 
-/// index.bin of version 2 while it is read: roots and pages come from the file when they are asked for, and the last
+/// index.bin while it is read: roots and pages come from the file when they are asked for, and the last
 /// few MiB of pages stay. Any number of threads at once. What is read throws Error{kCorrupt} where its CRC or a rule is
 /// broken, and as the file does.
 class PagedIndex {

@@ -26,9 +26,8 @@ struct JsonRule {
   /// What is not required may be missing or null: the value then stays as it was.
   enum Presence {
     kRequired,
-    kDefaulted,  ///< written always; older archives have none
-    kNull,       ///< null for an empty text, and for nullopt
-    kAbsent      ///< then not written at all
+    kNull,   ///< null for an empty text, and for nullopt
+    kAbsent  ///< then not written at all
   };
   Presence presence = kRequired;
   double least = -std::numeric_limits<double>::infinity();  ///< of integers 0

@@ -20,7 +20,6 @@ using Json = JsonMembers::Json;
 constexpr const char* kFormatName = "isohf";
 constexpr JsonRule kNull{.presence = JsonRule::kNull};
 constexpr JsonRule kAbsent{.presence = JsonRule::kAbsent};
-constexpr JsonRule kDefaulted{.presence = JsonRule::kDefaulted};
 
 JsonRule within(double most) {
   return {.least = -most, .most = most};
@@ -36,16 +35,15 @@ bool is_on_system(const Metadata& metadata) {
   return metadata.projection && metadata.projection->spec.kind == ProjectionKind::kSystem;
 }
 
-void version_members(JsonMembers& json, Metadata& metadata) {
-  int& version = metadata.version;
+void version_members(JsonMembers& json, const Metadata& metadata) {
   std::string format = kFormatName;
   json("format", format);
   if (format != kFormatName) json.refuse("format", fmt::format("is \"{}\", must be \"{}\"", format, kFormatName));
-  if (!json.reads()) version = kFormatVersion;
-  json("version", version, {.least = kOldestFormatVersion});
-  if (version > kFormatVersion) {
-    throw Error(ErrorCode::kUnsupported, fmt::format("metadata: format version {}; this build reads versions {} to {}",
-                                                     version, kOldestFormatVersion, kFormatVersion));
+  int version = kFormatVersion;
+  json("version", version, {.least = 1});
+  if (version != kFormatVersion) {
+    throw Error(ErrorCode::kUnsupported,
+                fmt::format("metadata: format version {}; this build reads version {}", version, kFormatVersion));
   }
   std::optional<std::vector<std::string>> requirements;
   if (!json.reads() && is_on_system(metadata)) requirements = {kProjectionSystem};
@@ -177,7 +175,7 @@ void projection_members(JsonMembers& json, ProjectionRecord& record) {
   json.object("worst_scale_error", "error", finite, "longitude", record.worst_place.longitude, "latitude",
               record.worst_place.latitude);
   error = finite.value_or(std::numeric_limits<double>::infinity());
-  json("why", record.why, kDefaulted);
+  json("why", record.why);
 }
 
 void ground_members(JsonMembers& json, MapGround& ground) {
@@ -194,7 +192,7 @@ void mosaic_members(JsonMembers& json, MosaicRecord& mosaic) {
            mosaic.overlap);
 }
 
-void source_members(JsonMembers& json, SourceRecord& source, int version) {
+void source_members(JsonMembers& json, SourceRecord& source) {
   constexpr JsonRule kSamples{.most = 4294967296.0};
   json("name", source.name);
   json("format", source.format);
@@ -202,24 +200,21 @@ void source_members(JsonMembers& json, SourceRecord& source, int version) {
   json("height", source.height, kSamples);
   json("sample_type", source.sample_type);
   json("channel", source.channel, kNull);
-  json("z_scale", source.z_scale, kDefaulted);
-  json("z_offset", source.z_offset, kDefaulted);
-  json.object(
-      "voids",
-      [&](JsonMembers& voids) {
-        voids("values", source.void_values);
-        std::optional<std::vector<double>> ends;  // which may be infinite
-        if (source.raw_range) ends = {source.raw_range->first, source.raw_range->second};
-        voids("raw_range", ends, kAbsent);
-        if (voids.reads() && ends) {
-          if (ends->size() != 2) voids.refuse("raw_range", "is no array of two numbers");
-          source.raw_range = {ends->front(), ends->back()};
-          if (!(ends->front() <= ends->back())) voids.refuse("raw_range", "is not the smaller number first");
-        }
-        voids("valid_range", source.valid_range, kNull);
-        voids("fill_distance", source.fill_distance, {.most = std::numeric_limits<std::int32_t>::max()});
-      },
-      kDefaulted);
+  json("z_scale", source.z_scale);
+  json("z_offset", source.z_offset);
+  json.object("voids", [&](JsonMembers& voids) {
+    voids("values", source.void_values);
+    std::optional<std::vector<double>> ends;  // which may be infinite
+    if (source.raw_range) ends = {source.raw_range->first, source.raw_range->second};
+    voids("raw_range", ends, kAbsent);
+    if (voids.reads() && ends) {
+      if (ends->size() != 2) voids.refuse("raw_range", "is no array of two numbers");
+      source.raw_range = {ends->front(), ends->back()};
+      if (!(ends->front() <= ends->back())) voids.refuse("raw_range", "is not the smaller number first");
+    }
+    voids("valid_range", source.valid_range, kNull);
+    voids("fill_distance", source.fill_distance, {.most = std::numeric_limits<std::int32_t>::max()});
+  });
   std::string registration = to_string(source.registration);
   json("registration", registration);
   source.registration = registration == "area"    ? Registration::kArea
@@ -239,10 +234,7 @@ void source_members(JsonMembers& json, SourceRecord& source, int version) {
     crs("metres_per_unit", metres_per_unit, kAbsent);
   });
   json.object("ground", source.ground, ground_members, kAbsent);
-  // Archives of version 1 tell the unit by the spacings alone.
-  const bool is_plain = version == 1 && !source.ground && source.crs_unit == "metre" && source.crs_spacing_x > 0.0;
-  if (json.reads())
-    source.metres_per_unit = metres_per_unit.value_or(is_plain ? source.spacing_x / source.crs_spacing_x : 1.0);
+  if (json.reads()) source.metres_per_unit = metres_per_unit.value_or(1.0);
   json.object("body", [&](JsonMembers& body) {
     body("name", source.body, kNull);
     body.all("semi_major_axis_m", source.semi_major_axis_m, "inverse_flattening", source.inverse_flattening);
@@ -270,18 +262,18 @@ void metadata_members(JsonMembers& json, Metadata& metadata) {
   json.object("valid", "x0", valid.x0, "z0", valid.z0, "x1", valid.x1, "z1", valid.z1);
   json.name("outside", metadata.outside, outside_from_string);
   json.object("projection", metadata.projection, projection_members, kNull);
-  json("wraps_x", metadata.wraps_x, kDefaulted);
+  json("wraps_x", metadata.wraps_x);
   json.name("filter", metadata.filter, filter_from_string);
-  json.name("edges", metadata.edges, edges_from_string, kDefaulted);
+  json.name("edges", metadata.edges, edges_from_string);
   json.name("acquisition", metadata.acquisition, acquisition_from_string);
   json("level", metadata.level, {.presence = JsonRule::kAbsent, .least = 1, .most = 12});
-  json.object("source", [&](JsonMembers& source) { source_members(source, metadata.source, metadata.version); });
+  json.object("source", [&](JsonMembers& source) { source_members(source, metadata.source); });
   Statistics& counted = metadata.statistics;
   json.object("statistics", "min", counted.min, "max", counted.max, "mean", counted.mean, "vertices", counted.vertices,
               "voids", counted.voids, "clamped", counted.clamped, "worst_rounding", counted.worst_rounding);
   json("textures", metadata.textures);
   json("content_sha256", metadata.content_sha256);
-  json("ground_sha256", metadata.ground_sha256, kAbsent);
+  json("ground_sha256", metadata.ground_sha256);
 }
 
 Metadata empty_metadata() {
@@ -367,7 +359,7 @@ void check_hash(const char* name, const std::string& hash) {
 
 void check(const Metadata& metadata) {
   check_hash("content_sha256", metadata.content_sha256);
-  if (metadata.version >= 2) check_hash("ground_sha256", metadata.ground_sha256);
+  check_hash("ground_sha256", metadata.ground_sha256);
   const Quantisation& codes = metadata.quantisation;
   require(std::isfinite(codes.offset + codes.scale * 65535.0), "samples.scale", codes.scale,
           "not lead beyond all numbers");

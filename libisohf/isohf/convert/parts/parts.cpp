@@ -119,7 +119,6 @@ void require_copyable(const ArchiveReader& archive) {
   const auto refuse = [&](const char* why) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: {}", archive.path(), why));
   };
-  if (archive.metadata().version < 2) refuse("is of version 1 of the format; isohf planes writes it in version 2");
   if (archive.reads_by_directory()) refuse("was repacked by another tool; isohf planes puts it in order");
 }
 

@@ -18,7 +18,7 @@ namespace isohf {
 /// The same for tiles that are compared by elevations, whatever their codes.
 [[nodiscard]] std::string why_other_vertices(const Metadata& one, const Metadata& other);
 
-/// Throws Error{kInvalidArgument} where an archive's members cannot be copied as they are: of version 1, repacked.
+/// Throws Error{kInvalidArgument} where an archive's members cannot be copied as they are: repacked.
 void require_copyable(const ArchiveReader& archive);
 
 /// "columns 0 to 5 and rows 2 to 3", for messages.
