@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -204,22 +203,6 @@ void find_geoid(const std::string& archive, const std::vector<std::string>& file
                           archive, name));
 }
 
-/// Archives of before `source.options` say how their input was read by what it was read as.
-void take_record(const SourceRecord& record, OpenOptions& open) {
-  if (open.channel.empty()) open.channel = record.channel;
-  if (open.void_values.empty() && !record.mosaic) open.void_values = record.void_values;
-  if (!open.z_scale) open.z_scale = record.z_scale;
-  if (!open.z_offset) open.z_offset = record.z_offset;
-}
-
-bool is_as_recorded(const SourceInfo& info, const SourceRecord& record) {
-  const auto same = [](double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); };
-  return info.channel == record.channel && to_string(info.sample_type) == record.sample_type &&
-         info.z_scale == record.z_scale && info.z_offset == record.z_offset &&
-         std::equal(info.void_values.begin(), info.void_values.end(), record.void_values.begin(),
-                    record.void_values.end(), same);
-}
-
 /// The archive's input, read as it was read then.
 std::unique_ptr<HeightSource> open_as_recorded(VerifyCommandOptions options, const Metadata& metadata) {
   const SourceRecord& record = metadata.source;
@@ -227,12 +210,6 @@ std::unique_ptr<HeightSource> open_as_recorded(VerifyCommandOptions options, con
   if (options.geoid_is_recorded && !options.geoid.path.empty()) find_geoid(options.archive, files, options.geoid);
   OpenOptions& open = options.open;
   if (!open.registration) open.registration = record.registration;
-  if (!record.options) {
-    if (!open.voids.valid_range) open.voids.valid_range = record.valid_range;
-    if (open.voids.distance() == 0 && record.fill_distance > 0) open.voids.fill_distance = record.fill_distance;
-    if (!options.against.overlap_given && record.mosaic && record.mosaic->overlap == "first")
-      options.against.overlap = OverlapRule::kFirst;
-  }
   // Inputs of different reference systems were joined in that of the record.
   if (const std::string system = system_text(source_georeference(record).system); record.mosaic && !system.empty()) {
     ProjectionRequest& onto = options.against.onto;
@@ -243,13 +220,7 @@ std::unique_ptr<HeightSource> open_as_recorded(VerifyCommandOptions options, con
   }
   GroundRequest ground;
   ground.wrap_x = metadata.wraps_x;
-  const auto opened = [&] {
-    return laid_out(std::move(open_inputs(files, options.against, open, options.work).source), options.geoid, ground);
-  };
-  std::unique_ptr<HeightSource> source = opened();
-  if (record.options || is_as_recorded(source->info(), record)) return source;
-  take_record(record, open);
-  return opened();
+  return laid_out(std::move(open_inputs(files, options.against, open, options.work).source), options.geoid, ground);
 }
 
 /// What of the measured error is more than was allowed; empty where nothing is.

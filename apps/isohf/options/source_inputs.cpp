@@ -85,7 +85,6 @@ void add_mosaic_options(CommandLine& line, SourceInputs& inputs) {
       "over coarser ones, and voids show what lies below",
       [&](const std::string& text) {
         inputs.overlap = parse_word(text, {"last", "first"}) == 0 ? OverlapRule::kLast : OverlapRule::kFirst;
-        inputs.overlap_given = true;
       });
   line.flag("--require-complete", "Fail where tiles are missing or ground lies in no input, and name it",
             inputs.require_complete);

@@ -23,7 +23,6 @@ using RecordedOptions = std::vector<std::pair<std::string, std::string>>;
 struct SourceInputs {
   std::vector<std::string> names;  ///< files, folders, patterns and @lists, as on the command line
   OverlapRule overlap = OverlapRule::kLast;
-  bool overlap_given = false;
   bool require_complete = false;
   bool recursive = false;
   std::optional<BoundingBox> box;           ///< of the whole, only this part
