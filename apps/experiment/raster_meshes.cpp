@@ -98,8 +98,7 @@ class Study {
         kernel_(Kernel::make(known(surface_.filter, "filter"), known(surface_.edges, "edges"))) {
     const RowRange all{0, record_.height - 1};
     const Prefilter as_they_are = Prefilter::make(Filter::kBilinear, {});
-    const Prefilter prefilter =
-        Prefilter::make(kernel_.filter(), known(surface_.acquisition, "acquisition"), kernel_.edges());
+    const Prefilter prefilter = Prefilter::make(kernel_.filter(), known(surface_.acquisition, "acquisition"));
     samples_ = BandReader(source, datum_, as_they_are).read(all);
     coefficients_ = prefilter.is_identity() ? samples_ : BandReader(source, datum_, prefilter).read(all);
   }

@@ -46,8 +46,18 @@ Prefilter make(Filter filter, const char* acquisition = "point") {
   return Prefilter::make(filter, acquisition_from_string(acquisition));
 }
 
-/// Unser's recursion as in textbooks, whole signal, mirror ends: the reference for the truncated impulse response.
-std::vector<double> recursive_prefilter(std::vector<double> s, const std::vector<double>& poles) {
+/// Unser's recursion as in textbooks, of the row continued far beyond both ends: the reference for the truncated impulse
+/// response.
+std::vector<double> recursive_prefilter(std::span<const float> row, const std::vector<double>& poles) {
+  constexpr std::int64_t kBeyond = 200;
+  const auto count = static_cast<std::int64_t>(row.size());
+  std::vector<double> s;
+  for (std::int64_t k = -kBeyond; k < count + kBeyond; ++k) {
+    double height = 0.0;
+    continue_row(k, count,
+                 [&](std::int64_t at, int weight) { height += weight * double{row[static_cast<std::size_t>(at)]}; });
+    s.push_back(height);
+  }
   const auto n = static_cast<std::int64_t>(s.size());
   for (const double z : poles) {
     double start = 0.0;
@@ -60,7 +70,7 @@ std::vector<double> recursive_prefilter(std::vector<double> s, const std::vector
     s.back() = z / (z * z - 1.0) * (s.back() + z * s[s.size() - 2]);
     for (std::size_t k = s.size() - 1; k-- > 0;) s[k] = z * (s[k + 1] - s[k]);
   }
-  return s;
+  return {s.begin() + kBeyond, s.end() - kBeyond};
 }
 
 TEST(Prefilter, OfInterpolatingKernelsAndPointsIsTheIdentity) {
@@ -96,8 +106,8 @@ TEST(Prefilter, AgreesWithUnsersRecursion) {
                         Case{Filter::kBspline3, "box", {quartic_slow, quartic_fast}}}) {
     for (const std::int64_t count : {2, 3, 5, 16, 17, 40, 100}) {
       Raster raster = random_raster(count, 1, 7);
-      const std::vector<double> expected = recursive_prefilter({raster.heights.begin(), raster.heights.end()}, c.poles);
-      Prefilter::make(c.filter, acquisition_from_string(c.acquisition), Edges::kMirror).filter_rows(raster.view());
+      const std::vector<double> expected = recursive_prefilter(raster.heights, c.poles);
+      make(c.filter, c.acquisition).filter_rows(raster.view());
       for (std::size_t k = 0; k < expected.size(); ++k) {
         // Half a unit in the last place of coefficients up to 2^14, and 1e-9 of 4000 left out of the response.
         EXPECT_NEAR(raster.heights[k], expected[k], 5e-4 + 4e-6) << to_string(c.filter) << c.acquisition << count;
@@ -185,8 +195,8 @@ TEST(Prefilter, PolynomialsUpToTheDegreeComeBackFromTheirPointsAndBoxMeans) {
 /// A coefficient, beyond the raster's ends as well.
 double continued(View2D<const float> c, std::int64_t column, std::int64_t row) {
   double height = 0.0;
-  continue_row(row, c.rows(), Edges::kOdd, [&](std::int64_t r, int row_weight) {
-    continue_row(column, c.columns(), Edges::kOdd,
+  continue_row(row, c.rows(), [&](std::int64_t r, int row_weight) {
+    continue_row(column, c.columns(),
                  [&](std::int64_t i, int weight) { height += row_weight * weight * static_cast<double>(c(i, r)); });
   });
   return height;
@@ -375,7 +385,7 @@ NextToVoids next_to_voids(const Kernel& kernel, std::uint64_t seed) {
     }
   }
   Raster coefficients = holed;
-  Prefilter::make(kernel.filter(), {}, kernel.edges()).filter(coefficients.view());
+  Prefilter::make(kernel.filter(), {}).filter(coefficients.view());
   NextToVoids found;
   for (double v = 6.3; v < 121.0; v += 0.93) {
     const std::vector<double> truth = field.row(v, 6.4, 1.07, 107);

@@ -151,7 +151,7 @@ struct Metadata {
   // nullopt: a name that this build does not know; the surface can be read all the same.
   std::optional<Outside> outside = Outside::kCover;
   std::optional<Filter> filter = Filter::kBilinear;
-  std::optional<Edges> edges = Edges::kMirror;  ///< how samples went on beyond the source's ends
+  std::optional<Edges> edges = Edges::kOdd;  ///< how samples went on beyond the source's ends
   std::optional<Acquisition> acquisition = Acquisition{};
   std::optional<int> level;  ///< that the tiles were coded at; tells readers nothing
   SourceRecord source;

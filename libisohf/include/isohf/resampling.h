@@ -19,12 +19,11 @@ inline constexpr Filter kDefaultFilter = Filter::kLimitedCubic;
 
 /// How a row of samples goes on beyond its ends, and into voids, for taps that reach there.
 enum class Edges {
-  kMirror,  ///< s[-k] = s[k]: bends a slope; archives that do not name a rule
-  kOdd,     ///< s[-k] = 2 s[0] - s[k], mirrored at the last sample as a point: planes stay planes
+  kOdd,  ///< s[-k] = 2 s[0] - s[k], mirrored at the last sample as a point: planes stay planes
   kHeld,  ///< the same, and next to voids held near the samples around the place: at most a quarter of their range beyond it
 };
 
-[[nodiscard]] std::string to_string(Edges edges);                ///< "mirror", "odd", "odd-held"
+[[nodiscard]] std::string to_string(Edges edges);                ///< "odd", "odd-held"
 [[nodiscard]] Edges edges_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
 /// What convert() does: kHeld for kBspline3, kOdd for filters whose result it does not change.
 [[nodiscard]] Edges usual_edges(Filter filter);

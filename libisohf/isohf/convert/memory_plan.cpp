@@ -64,7 +64,7 @@ class Estimate {
         std::min(rounded(grid.shape().columns() * 2.0 * grid.sigma_x() / plan.frame.spacing_x) + taps + 2, info_.width);
     reads_whole_rows_ = plan.frame.warp || plan.frame.wraps_x;
     has_bands_ = !prefilter.is_identity() || plan.frame.warp;
-    if (chooses_codes(options)) smoothing_ = Prefilter::smoothing(Edges::kOdd);
+    if (chooses_codes(options)) smoothing_ = Prefilter::smoothing();
   }
 
   [[nodiscard]] MemoryPlan with(const Ration& ration, bool in_scratch) const {

@@ -33,7 +33,7 @@ class VertexCheck {
         grid_(archive.grid()),
         source_(source),
         kernel_(Kernel::make(known(metadata_.filter, "filter"), known(metadata_.edges, "edges"))),
-        prefilter_(Prefilter::make(kernel_.filter(), known(metadata_.acquisition, "acquisition"), kernel_.edges())),
+        prefilter_(Prefilter::make(kernel_.filter(), known(metadata_.acquisition, "acquisition"))),
         limits_(code_limits(metadata_)),
         here_(tiles_here(metadata_)),
         only_on_ground_(!states_job(metadata_) && !archive.find_member(kWholeName)) {

@@ -75,8 +75,8 @@ double evaluate(const Kernel& kernel, View2D<const float> coefficients, View2D<c
                 double v) {
   const auto coefficient = [&](std::int64_t c, std::int64_t r) {
     double height = 0.0;
-    continue_row(r, coefficients.rows(), kernel.edges(), [&](std::int64_t row, int row_weight) {
-      continue_row(c, coefficients.columns(), kernel.edges(), [&](std::int64_t column, int weight) {
+    continue_row(r, coefficients.rows(), [&](std::int64_t row, int row_weight) {
+      continue_row(c, coefficients.columns(), [&](std::int64_t column, int weight) {
         height += row_weight * weight * static_cast<double>(coefficients(column, row));
       });
     });
@@ -115,7 +115,7 @@ double evaluate(const Kernel& kernel, View2D<const float> coefficients, View2D<c
     }
   }
   if (valid < 0.5) return nothing;
-  if (kernel.edges() != Edges::kMirror && taps == 4) {
+  if (taps == 4) {
     for (int line = 0; line < 8; ++line) {  // rows, then columns
       go_on([&](int k) -> double& { return line < 4 ? tap(k, line) : tap(line - 4, k); });
     }

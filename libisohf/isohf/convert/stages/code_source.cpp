@@ -12,7 +12,7 @@ ElevationRange limits_of(const Conversion& conversion) {
 CodeSource::CodeSource(const Conversion& conversion)
     : conversion_(conversion), exact_(conversion, limits_of(conversion), conversion.prefilter) {
   if (conversion.most_off() > 0.0) {
-    smooth_.emplace(conversion, limits_of(conversion), Prefilter::smoothing(conversion.kernel.edges()));
+    smooth_.emplace(conversion, limits_of(conversion), Prefilter::smoothing());
   }
 }
 

@@ -24,7 +24,7 @@ double lebesgue_constant(const Kernel& kernel, const Prefilter& prefilter) {
       for (std::int64_t j = -reach; j <= reach; ++j) {
         const double weight =
             double{at.weights[static_cast<std::size_t>(tap)]} * response[static_cast<std::size_t>(std::abs(j))];
-        continue_row(at.first + tap + j, count, kernel.edges(),
+        continue_row(at.first + tap + j, count,
                      [&](std::int64_t k, int share) { weights[static_cast<std::size_t>(k)] += share * weight; });
       }
     }

@@ -92,8 +92,7 @@ Filter filter_from_string(const std::string& text) {
 }
 
 std::string to_string(Edges edges) {
-  if (edges == Edges::kHeld) return "odd-held";
-  return edges == Edges::kOdd ? "odd" : "mirror";
+  return edges == Edges::kHeld ? "odd-held" : "odd";
 }
 
 Edges usual_edges(Filter filter) {
@@ -103,8 +102,7 @@ Edges usual_edges(Filter filter) {
 Edges edges_from_string(const std::string& text) {
   if (text == "odd-held") return Edges::kHeld;
   if (text == "odd") return Edges::kOdd;
-  if (text == "mirror") return Edges::kMirror;
-  throw Error(ErrorCode::kInvalidArgument, "edges is \"" + text + "\", must be odd-held, odd or mirror");
+  throw Error(ErrorCode::kInvalidArgument, "edges is \"" + text + "\", must be odd-held or odd");
 }
 
 Kernel Kernel::make(Filter filter, Edges edges) {

@@ -29,7 +29,7 @@ struct TapWeights {
 ///   4. The value is the sum of w[i] v[j] c[i, j]. Where some of these coefficients are NaN, they are left out and the
 ///      sum is divided by the weight of the others; a Prefilter leaves none NaN where rule 2 holds, so that happens
 ///      only to samples that are their own coefficients. But with four samples around the
-///      point that are no voids, nothing is left out unless the rule is Edges::kMirror: the missing taps are continued
+///      point that are no voids, nothing is left out: the missing taps are continued
 ///      like those beyond the raster's ends, first along each row whose two middle taps are samples, then row by row.
 ///   5. With Edges::kHeld and four taps, where a tap's sample is a void: of the four samples around the point
 ///      those that are no voids, as the kernel reconstructs them, have a range; a value farther beyond it than a
@@ -74,8 +74,8 @@ class Kernel {
 /// Calls use(index, weight), weight 1, 2, -1 or -2, for samples whose weighted sum stands in for sample k of a row of
 /// `count`. count >= 1; any k.
 template <typename Use>
-void continue_row(std::int64_t k, std::int64_t count, Edges edges, Use use) {
-  if (edges == Edges::kMirror || count == 1) return use(mirror_index(k, count), 1);
+void continue_row(std::int64_t k, std::int64_t count, Use use) {
+  if (count == 1) return use(0, 1);
   int sign = 1;
   for (; k < 0 || k >= count; sign = -sign) {
     const std::int64_t end = k < 0 ? 0 : count - 1;

@@ -13,7 +13,6 @@
 #include <mutex>
 #include <numbers>
 #include <string>
-#include <tuple>
 #include <utility>
 
 #include "isohf/base/assert.h"
@@ -85,8 +84,8 @@ struct Line {
 class LineFilter {
  public:
   /// taps as in Prefilter; voids up to `border` samples from a valid one receive coefficients as well.
-  LineFilter(const std::vector<double>& taps, std::int64_t border, Edges edges)
-      : taps_(taps), reach_(static_cast<std::int64_t>(taps.size()) - 1), border_(border), edges_(edges) {}
+  LineFilter(const std::vector<double>& taps, std::int64_t border)
+      : taps_(taps), reach_(static_cast<std::int64_t>(taps.size()) - 1), border_(border) {}
 
   /// Filters samples `from` to `to` of a line of `count`, run by run; out[0] is the coefficient at `from`. Places of
   /// out that no run reaches are left alone. out may be the line itself.
@@ -137,20 +136,13 @@ class LineFilter {
 
   /// Voids between the source's ends and the `count` samples nearest to them, at places `from` to 0 and count to `to`.
   void fill_to_ends(double* samples, std::int64_t count, std::int64_t from, std::int64_t to) const {
-    const auto fill = [&](std::int64_t k) {
-      if (edges_ == Edges::kMirror) {  // bridged to its own mirror image
-        samples[k] = samples[k < 0 ? 0 : count - 1];
-      } else {
-        go_on(samples, count, k);
-      }
-    };
-    for (std::int64_t k = from; k < 0; ++k) fill(k);
-    for (std::int64_t k = count; k < to; ++k) fill(k);
+    for (std::int64_t k = from; k < 0; ++k) go_on(samples, count, k);
+    for (std::int64_t k = count; k < to; ++k) go_on(samples, count, k);
   }
 
   void go_on(double* samples, std::int64_t count, std::int64_t k) const {
     double height = 0.0;
-    continue_row(k, count, edges_, [&](std::int64_t at, int weight) { height += weight * samples[at]; });
+    continue_row(k, count, [&](std::int64_t at, int weight) { height += weight * samples[at]; });
     samples[k] = height;
   }
 
@@ -170,7 +162,6 @@ class LineFilter {
   const std::vector<double>& taps_;
   std::int64_t reach_;
   std::int64_t border_;
-  Edges edges_;
   std::vector<double> samples_;
   std::vector<float> coefficients_;
 };
@@ -184,13 +175,13 @@ struct Strip {
 
 /// Copies a strip of columns, rows begin to end of the band, continued at the band's ends; notes which have voids.
 void load_strip(View2D<const float> band, std::int64_t column, std::int64_t columns, std::int64_t begin,
-                std::int64_t end, Edges edges, Strip& strip) {
+                std::int64_t end, Strip& strip) {
   strip.has_void.fill(0);
   double* samples = strip.samples.data();
   int* has_void = strip.has_void.data();
   for (std::int64_t r = begin; r < end; ++r, samples += kStripColumns) {
     std::fill(samples, samples + kStripColumns, 0.0);
-    continue_row(r, band.rows(), edges, [&](std::int64_t at, int weight) {
+    continue_row(r, band.rows(), [&](std::int64_t at, int weight) {
       const float* row = band.row(at) + column;
       for (std::int64_t i = 0; i < columns; ++i) {
         has_void[i] |= static_cast<int>(row[i] != row[i]);
@@ -212,16 +203,16 @@ void in_parallel(std::int64_t count, std::int64_t grain, const Work& work) {
 
 }  // namespace
 
-Prefilter::Prefilter(std::vector<double> taps, int border, double worst_gain, Edges edges)
-    : taps_(std::move(taps)), border_(taps_.size() == 1 ? 0 : border), edges_(edges), worst_gain_(worst_gain) {}
+Prefilter::Prefilter(std::vector<double> taps, int border, double worst_gain)
+    : taps_(std::move(taps)), border_(taps_.size() == 1 ? 0 : border), worst_gain_(worst_gain) {}
 
-Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition, Edges edges) {
+Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition) {
   const Acquisition used = with_taps(acquisition);
   // A conversion asks several times for the same, and many conversions do: it takes longer than a small raster.
   static std::mutex mutex;
-  static std::map<std::tuple<Filter, std::string, Edges>, Prefilter> made;
+  static std::map<std::pair<Filter, std::string>, Prefilter> made;
   constexpr std::size_t kMostMade = 16;
-  const std::tuple key(filter, to_string(acquisition), edges);
+  const std::pair key(filter, to_string(acquisition));
   {
     const std::lock_guard lock(mutex);
     if (const auto found = made.find(key); found != made.end()) return found->second;
@@ -275,21 +266,21 @@ Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition, Edges e
                                                          to_string(acquisition), kLongestHalo));
   }
   if (taps.size() == 1) taps[0] = 1.0;
-  Prefilter prefilter(std::move(taps), (kernel.taps() + 1) / 2, worst_gain, edges);
+  Prefilter prefilter(std::move(taps), (kernel.taps() + 1) / 2, worst_gain);
   const std::lock_guard lock(mutex);
   if (made.size() == kMostMade) made.clear();
   made.emplace(key, prefilter);
   return prefilter;
 }
 
-Prefilter Prefilter::smoothing(Edges edges) {
-  return {{20.0 / 64.0, 15.0 / 64.0, 6.0 / 64.0, 1.0 / 64.0}, 0, 1.0, edges};
+Prefilter Prefilter::smoothing() {
+  return {{20.0 / 64.0, 15.0 / 64.0, 6.0 / 64.0, 1.0 / 64.0}, 0, 1.0};
 }
 
 void Prefilter::filter_rows(View2D<float> band, bool wraps) const {
   if (is_identity()) return;
   in_parallel(band.rows(), 4, [&](std::int64_t begin, std::int64_t end) {
-    LineFilter lines(taps_, border_, edges_);
+    LineFilter lines(taps_, border_);
     // All that a coefficient depends on, written down once more on either side.
     const std::int64_t beyond = wraps ? halo() : 0;
     std::vector<float> round(static_cast<std::size_t>(wraps ? band.columns() + 2 * beyond : 0));
@@ -322,11 +313,11 @@ void Prefilter::filter_columns(View2D<const float> band, std::int64_t first, Vie
     Strip strip;
     strip.samples.resize(static_cast<std::size_t>((rows + 2 * reach) * kStripColumns));
     strip.coefficients.resize(static_cast<std::size_t>(rows * kStripColumns));
-    LineFilter lines(taps_, border_, edges_);
+    LineFilter lines(taps_, border_);
     for (std::int64_t column = begin * kStripColumns; column < std::min(end * kStripColumns, band.columns());
          column += kStripColumns) {
       const std::int64_t columns = std::min(kStripColumns, band.columns() - column);
-      load_strip(band, column, columns, first - reach, first + rows + reach, edges_, strip);
+      load_strip(band, column, columns, first - reach, first + rows + reach, strip);
       // Columns do not touch each other: those with voids come out wrong here and are done again, run by run.
       vectorised<convolve<FourDoubles>, convolve<FourDoubles>, convolve<EightDoubles>>(
           strip.samples.data() + reach * kStripColumns, kStripColumns, taps_.data(), reach,

@@ -19,7 +19,7 @@ namespace isohf {
 /// blocks, the bits are the same. Sums are double, in order of k, and rounded to float once for each axis.
 ///
 /// Voids are NaN and never read as numbers: each run of samples is filtered alone, continued at its ends as the source
-/// is at its own (Edges).
+/// is at its own (continue_row).
 ///
 ///   samples        . . . . . . . s s s s s s . . s s s s s . . . . . . .      . void    s sample
 ///   coefficients   . . . . b b b c c c c c c l l c c c c c b b b . . . .      c of a sample
@@ -34,13 +34,13 @@ class Prefilter {
  public:
   /// The inverse exists and is stable where the spectrum of a is positive. It is refused, Error{kInvalidArgument} with
   /// the gain and its frequency, where the acquisition is to be amplified more than kMostGain times along one axis.
-  [[nodiscard]] static Prefilter make(Filter filter, const Acquisition& acquisition, Edges edges = Edges::kOdd);
+  [[nodiscard]] static Prefilter make(Filter filter, const Acquisition& acquisition);
 
   static constexpr double kMostGain = 100.0;
 
   /// Instead of that a mean of the samples around, along each axis by the weights 1 6 15 20 15 6 1 / 64. Voids are as
   /// above, and no place beyond a sample receives a coefficient.
-  [[nodiscard]] static Prefilter smoothing(Edges edges);
+  [[nodiscard]] static Prefilter smoothing();
 
   /// True where samples are their own coefficients; the functions below then only copy.
   [[nodiscard]] bool is_identity() const { return taps_.size() == 1; }
@@ -68,11 +68,10 @@ class Prefilter {
   void filter(View2D<float> raster) const;
 
  private:
-  Prefilter(std::vector<double> taps, int border, double worst_gain, Edges edges);
+  Prefilter(std::vector<double> taps, int border, double worst_gain);
 
   std::vector<double> taps_;
   int border_;
-  Edges edges_;
   double worst_gain_;
 };
 

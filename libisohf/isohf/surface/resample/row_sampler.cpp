@@ -50,7 +50,7 @@ void blend_rows(const SourceBand& band, const TapWeights& rows, const Kernel& ke
       is_first ? vectorised<weigh>(in, weight, inner, out) : vectorised<add_weighted>(in, weight, inner, out);
     const auto beyond = [&](std::int64_t k) {
       float height = 0.0F;
-      axis_x.stand_ins(columns.first + k, kernel.edges(), [&](std::int64_t column, int share) {
+      axis_x.stand_ins(columns.first + k, [&](std::int64_t column, int share) {
         height += static_cast<float>(share) * source[column - band.first_column];
       });
       float& place = line[static_cast<std::size_t>(k)];
@@ -69,7 +69,7 @@ void blend_rows(const SourceBand& band, const TapWeights& rows, const Kernel& ke
   }
   for (int t = 0; t < kernel.taps(); ++t) {
     const float weight = rows.weights[static_cast<std::size_t>(t)];
-    axis_z.stand_ins(rows.first + t, kernel.edges(),
+    axis_z.stand_ins(rows.first + t,
                      [&](std::int64_t row, int share) { add_row(row, static_cast<float>(share) * weight, at_once); });
   }
 }

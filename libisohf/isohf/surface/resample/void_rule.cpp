@@ -27,7 +27,7 @@ float VoidRule::at(double u, double v, const TapWeights& columns, const TapWeigh
     }
   }
   if (valid_weight < 0.5) return std::numeric_limits<float>::quiet_NaN();
-  if (!whole && kernel_.edges() != Edges::kMirror) complete(taps);
+  if (!whole) complete(taps);
   double sum = 0.0;
   double missing_weight = 0.0;
   double weight_sum = 0.0;
@@ -95,8 +95,8 @@ void VoidRule::complete(Taps& taps) const {
 
 double VoidRule::coefficient(std::int64_t column, std::int64_t row) const {
   double sum = 0.0;
-  axis_z_.stand_ins(row, kernel_.edges(), [&](std::int64_t r, int row_weight) {
-    axis_x_.stand_ins(column, kernel_.edges(), [&](std::int64_t c, int column_weight) {
+  axis_z_.stand_ins(row, [&](std::int64_t r, int row_weight) {
+    axis_x_.stand_ins(column, [&](std::int64_t c, int column_weight) {
       sum += row_weight * column_weight * double{band_.heights(c - band_.first_column, r - band_.first_row)};
     });
   });

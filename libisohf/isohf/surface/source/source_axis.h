@@ -48,9 +48,9 @@ class SourceAxis {
   }
   /// The same with weights, for heights (continue_row).
   template <typename Use>
-  void stand_ins(std::int64_t k, Edges edges, Use use) const {
+  void stand_ins(std::int64_t k, Use use) const {
     if (wraps_ || (k >= 0 && k < samples_)) return use(index(k), 1);
-    continue_row(k, samples_, edges, use);
+    continue_row(k, samples_, use);
   }
   /// Whole samples inside the edge that a continued place may read.
   [[nodiscard]] std::int64_t continued_samples() const;
