@@ -967,7 +967,7 @@ class Archive:
     def predicted(self):
         """The elevations that the surface has at the source's samples, None where it has none."""
         record, source = self.metadata["lossless"], self.metadata["source"]
-        width, height, bits = record["width"], record["height"], record.get("fraction_bits")
+        width, height, bits = record["width"], record["height"], record["fraction_bits"]
         require(record["prediction"] in ("spline", "triangles"), "prediction %s: not supported" % record["prediction"])
         surface = Surface(self.metadata, list(self.integers(bits)))
         if record["prediction"] == "spline":

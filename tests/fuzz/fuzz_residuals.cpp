@@ -41,11 +41,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (int y = 0; y < 3; ++y) mesh.row(y, row);
   } catch (const isohf::Error&) {
   }
-  try {
-    std::vector<isohf::WorldPoint> row(static_cast<std::size_t>(width));
-    const isohf::PositionMesh mesh = isohf::positions_from_bytes(width, 3, payload);
-    for (int y = 0; y < 3; ++y) mesh.row(y, row);
-  } catch (const isohf::Error&) {
-  }
   return 0;
 }

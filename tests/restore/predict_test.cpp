@@ -9,10 +9,10 @@
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
 #include "isohf/restore/grid_sampler.h"
-#include "isohf/restore/position_mesh.h"
 #include "isohf/restore/predict/place_mesh.h"
 #include "isohf/restore/predict/spline_predictor.h"
 #include "isohf/restore/rows/spline_rows.h"
+#include "isohf/surface/resample/kernels.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -51,12 +51,31 @@ TEST(FixedQuintic, IsTheSplinesWeightsRounded) {
 
 /// Tiles of a field over the whole lattice, in codes of a hundredth; shared vertices are equal.
 struct Field {
-  TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 3, 3, 40.0, 40.0);
+  static constexpr int kTiles = 3;
+
+  /// around  more tiles on each side, which hold the lattice mirrored about its outermost vertices
+  explicit Field(int around = 0)
+      : grid(TileGrid::make(inner.shape(), kTiles + 2 * around, kTiles + 2 * around, 40.0, 40.0)),
+        around_tiles(around) {}
+
+  TileGrid inner = TileGrid::make(TileShape::make(12, 11, 2), kTiles, kTiles, 40.0, 40.0);
+  TileGrid grid;
+  int around_tiles;
   Quantisation quantisation{CodeType::kU16, -300.0, 0.01};
   bool has_hole = false;
 
   [[nodiscard]] double height(WorldPoint at) const {
     return 40.0 * std::sin(at.x * 0.11) * std::cos(at.z * 0.07) + 0.3 * at.x;
+  }
+  /// Rows are mirrored as a whole, and each along itself: the odd ones begin half a column step further West.
+  [[nodiscard]] LatticeVertex mirrored(LatticeVertex at) const {
+    const TileShape& shape = inner.shape();
+    const std::int64_t row = at.z - std::int64_t{around_tiles} * shape.cell_rows() + 1;
+    const bool is_odd = (row & 1) != 0;
+    const std::int64_t first = is_odd ? -2 : -1;
+    const std::int64_t column = (at.x - std::int64_t{2} * around_tiles * shape.cell_columns() - first) / 2;
+    return {first + 2 * mirror_index(column, kTiles * shape.cell_columns() + (is_odd ? 3 : 2)),
+            mirror_index(row, kTiles * shape.cell_rows() + 3) - 1};
   }
   [[nodiscard]] std::vector<TileCodes> read(std::span<const TileIndex> tiles) const {
     std::vector<TileCodes> found;
@@ -64,7 +83,8 @@ struct Field {
       TileCodes codes{CodeType::kU16, {}, {}};
       for (int r = 0; r < grid.shape().rows(); ++r) {
         for (int c = 0; c < grid.shape().columns(); ++c) {
-          const WorldPoint at = grid.world_from_lattice(grid.lattice_vertex(tile, {c, r}));
+          const LatticeVertex vertex = grid.lattice_vertex(tile, {c, r});
+          const WorldPoint at = inner.world_from_lattice(around_tiles > 0 ? mirrored(vertex) : vertex);
           const bool is_void = has_hole && std::hypot(at.x - 70.0, at.z - 50.0) < 11.0;
           codes.codes.push_back(is_void ? 65535
                                         : static_cast<std::uint16_t>(std::lround((height(at) + 300.0) * 100.0)));
@@ -85,7 +105,11 @@ TEST(SplinePredictor, AgreesWithTheSplinesInDoublesAndIsVoidWhereTheTrianglesAre
     field.has_hole = has_hole;
     const SampleGrid samples{61, 57, 0.7, 0.4, 1.95, 2.1};
     SplinePredictor predictor(field.grid, false, field.quantisation, 8, field.reader(), samples);
-    GridSampler hex(field.grid, false, field.quantisation, field.reader(), samples, RestoreMethod::kHex, false);
+    const Field mirrored(4);
+    SampleGrid inside = samples;
+    inside.first_x += 4 * 40.0;
+    inside.first_z += 4 * 40.0;
+    GridSampler hex(mirrored.grid, false, field.quantisation, mirrored.reader(), inside, RestoreMethod::kHex);
     GridSampler flat(field.grid, false, field.quantisation, field.reader(), samples, RestoreMethod::kBarycentric);
     std::vector<double> found(static_cast<std::size_t>(samples.width));
     std::vector<double> smooth(found.size());
@@ -140,7 +164,7 @@ TEST(PlaceMesh, HoldsCubicsForRastersOfAnySizeAndIsTheSameFromItsBytes) {
     for (const std::int64_t rows : {1, 2, 5, 64, 130}) {
       const PlaceMesh mesh(columns, rows, grid, cubic);
       const std::vector<std::byte> bytes = mesh.bytes();
-      ASSERT_EQ(bytes.size(), 8 * PositionMesh::value_count(columns, rows));
+      ASSERT_EQ(bytes.size(), 8 * PlaceMesh::value_count(columns, rows));
       const PlaceMesh again(columns, rows, bytes);
       std::vector<FixedPlace> line(static_cast<std::size_t>(columns));
       std::vector<FixedPlace> from_bytes(line.size());
@@ -168,15 +192,15 @@ TEST(PlaceMesh, HoldsCubicsForRastersOfAnySizeAndIsTheSameFromItsBytes) {
 }
 
 TEST(PlaceMesh, RefusesNodesFarAway) {
-  std::vector<std::byte> bytes(8 * PositionMesh::value_count(40, 40));
+  std::vector<std::byte> bytes(8 * PlaceMesh::value_count(40, 40));
   EXPECT_NO_THROW(PlaceMesh(40, 40, bytes));
   bytes[7] = std::byte{0x7F};
   EXPECT_THROW(PlaceMesh(40, 40, bytes), Error);
   bytes[7] = std::byte{0x80};  // no node
   EXPECT_NO_THROW(PlaceMesh(40, 40, bytes));
-  EXPECT_EQ(PositionMesh::step(10000, 10000), 32);
+  EXPECT_EQ(PlaceMesh::step(10000, 10000), 32);
   for (const std::int64_t side : {100000, 1000000, 1000000000}) {
-    EXPECT_LE(PositionMesh::value_count(side, side), std::size_t{3} << 20U);
+    EXPECT_LE(PlaceMesh::value_count(side, side), std::size_t{3} << 20U);
   }
 }
 

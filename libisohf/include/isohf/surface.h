@@ -245,9 +245,8 @@ struct SampleMapping {
   double z_offset = 0.0;
 };
 
-/// How an archive made without loss predicts its source's samples (docs/archive_format.md, section 7). The last three
-/// are those of archives from before the others.
-enum class SamplePrediction : std::uint8_t { kSpline, kTriangles, kHex, kBarycentric, kPlaces };
+/// How an archive made without loss predicts its source's samples (docs/archive_format.md, section 7).
+enum class SamplePrediction : std::uint8_t { kSpline, kTriangles };
 
 /// What an archive made without loss says of its source's samples.
 struct LosslessRecord {
@@ -255,10 +254,10 @@ struct LosslessRecord {
   std::int64_t width = 0;
   std::int64_t height = 0;
   SamplePrediction prediction = SamplePrediction::kSpline;
-  int fraction_bits = 0;  ///< of the integers that kSpline and kTriangles count with
+  int fraction_bits = 0;  ///< of the integers that predictions count with
   std::int64_t rows_per_member = 0;
   std::vector<double> void_values;  ///< as SourceInfo has them
-  /// Raw values outside are void as well; older archives do not tell.
+  /// Raw values outside are void as well.
   std::pair<double, double> valid = {-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   std::uint64_t residual_bytes = 0;  ///< of all residual members, compressed
   std::string sha256;                ///< over all raw samples, little-endian, row by row

@@ -80,20 +80,18 @@ struct GridSampler::Block {
 };
 
 GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
-                         const SampleGrid& samples, RestoreMethod method, bool snaps,
-                         const std::optional<TileGrid>& world, const ScratchFolder& scratch,
-                         const std::optional<Turn>& turn, const std::optional<TileRange>& here)
+                         const SampleGrid& samples, RestoreMethod method, const std::optional<TileGrid>& world,
+                         const ScratchFolder& scratch, const std::optional<Turn>& turn,
+                         const std::optional<TileRange>& here)
     : grid_(grid),
       quantisation_(quantisation),
       samples_(require_samples_near(samples, world.value_or(grid))),
       method_(method),
       end_z_(world.value_or(grid).world_height()),
       tolerance_(world ? kRoundedPlace : kRounding),
-      snaps_(snaps),
       here_(here.value_or(all_tiles(grid))),
-      beyond_(snaps ? Beyond::kSloped : Beyond::kMirrored),
       spline_(grid, method == RestoreMethod::kHex ? columns_of(samples, turn, tolerance_) : std::vector<double>{},
-              wraps_x, beyond_, scratch),
+              wraps_x, scratch),
       in_scratch_(scratch.has_value()),
       heights_(static_cast<std::size_t>(samples.width), scratch),
       near_void_(static_cast<std::size_t>(samples.width), scratch) {
@@ -172,7 +170,7 @@ RowRange GridSampler::lattice_rows_of(std::int64_t row) const {
   const std::int64_t start = quintic_weights(spline_.row_at(z)).first - QuinticResponse::kHalo;
   RowRange rows{spline_.rows() - 1, 0};
   for (std::int64_t k = start; k < start + QuinticResponse::kTaps; ++k) {
-    const StandIn from = stand_in(k, spline_.rows(), beyond_);
+    const StandIn from = stand_in(k, spline_.rows());
     rows.first = std::min(rows.first, from.first != 0.0 ? 0 : from.at);
     rows.last = std::max(rows.last, from.last != 0.0 ? spline_.rows() - 1 : from.at);
   }
@@ -212,8 +210,8 @@ void GridSampler::read_on_triangles(const TilePoint& at, const Block& block, std
   const TriangleRows vertices(*tiles_, grid_.shape(), at.tile.row, at.point.z, under.first, under.count);
   for (std::size_t c = 0; c < out.size(); ++c) {
     const Column& column = columns[c];
-    const Barycentric where = barycentric(grid_.shape(), {column.x, at.point.z});
-    out[c] = column.inside ? vertices.elevation(quantisation_, column.tile, snaps_ ? snapped(where) : where) : kVoid;
+    const Barycentric where = snapped(barycentric(grid_.shape(), {column.x, at.point.z}));
+    out[c] = column.inside ? vertices.elevation(quantisation_, column.tile, where) : kVoid;
   }
 }
 
@@ -228,7 +226,7 @@ void GridSampler::read_row(std::int64_t row, Block& block, std::span<double> out
   const QuinticResponse response = quintic_response(spline_.row_at(std::clamp(z, 0.0, grid_.world_height())));
   bool beside_voids = tiles_->has_voids(at.tile.row);
   for (std::int64_t t = 0; t < QuinticResponse::kTaps; ++t) {
-    const std::int64_t k = stand_in(response.first + t, spline_.rows(), beyond_).at;
+    const std::int64_t k = stand_in(response.first + t, spline_.rows()).at;
     beside_voids = beside_voids || is_any_near_void_[static_cast<std::size_t>(k - first_lattice_row_)] != 0;
   }
   if (beside_voids) read_on_triangles(at, block, out);
@@ -269,7 +267,7 @@ void GridSampler::blend_lattice_rows(const QuinticResponse& response, bool besid
   };
   std::array<Tap, QuinticResponse::kTaps> rows{};
   for (std::size_t t = 0; t < rows.size(); ++t) {
-    const StandIn from = stand_in(response.first + static_cast<std::int64_t>(t), spline_.rows(), beyond_);
+    const StandIn from = stand_in(response.first + static_cast<std::int64_t>(t), spline_.rows());
     rows[t] = {from, lattice_row(from.at), {}, {}};
     if (from.first != 0.0) rows[t].first = lattice_row(0);
     if (from.last != 0.0) rows[t].last = lattice_row(spline_.rows() - 1);

@@ -26,17 +26,15 @@ const SampleGrid& require_samples_near(const SampleGrid& samples, const TileGrid
 class GridSampler {
  public:
   /// wraps_x  the grid's East edge is its West edge
-  /// snaps    as in PointSampler; without it rows and columns are mirrored at their ends besides, as predictions of old
-  ///          archives have it
   /// world    where the surface ends, to a hundredth of a sample, as georeferences are rounded; nullopt: with the grid,
   ///          beyond which a coarse plane's may reach
   /// scratch  keeps tile rows and lattice rows where memory has no room for them
   /// here     the tiles that there are; nullopt: all
   /// turn     columns that miss the ground are looked for some turns away
   GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
-              const SampleGrid& samples, RestoreMethod method, bool snaps = true,
-              const std::optional<TileGrid>& world = {}, const ScratchFolder& scratch = {},
-              const std::optional<Turn>& turn = {}, const std::optional<TileRange>& here = {});
+              const SampleGrid& samples, RestoreMethod method, const std::optional<TileGrid>& world = {},
+              const ScratchFolder& scratch = {}, const std::optional<Turn>& turn = {},
+              const std::optional<TileRange>& here = {});
 
   /// What a sampler holds that reads so many rows at once, beside the elevations; an estimate.
   [[nodiscard]] static double memory_bytes(const TileGrid& grid, const SampleGrid& samples, RestoreMethod method,
@@ -78,9 +76,7 @@ class GridSampler {
   RestoreMethod method_;
   double end_z_;      ///< of the surface, world units
   double tolerance_;  ///< beyond it, samples
-  bool snaps_;
   TileRange here_;
-  Beyond beyond_;
   SplineRows spline_;
   std::vector<Column> columns_;
   std::optional<VertexRows> tiles_;  ///< kHex: all of a row, else those under samples

@@ -4,16 +4,13 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <type_traits>
 #include <utility>
 
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/assert.h"
-#include "isohf/base/bytes.h"
 #include "isohf/base/memory/memory_budget.h"
 #include "isohf/error.h"
 
@@ -22,28 +19,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::array<std::pair<SamplePrediction, const char*>, 5> kPredictions = {
-    {{SamplePrediction::kSpline, "spline"},
-     {SamplePrediction::kTriangles, "triangles"},
-     {SamplePrediction::kHex, "hex"},
-     {SamplePrediction::kBarycentric, "barycentric"},
-     {SamplePrediction::kPlaces, "places"}}};
-
 const char* name_of(SamplePrediction prediction) {
-  return std::find_if(kPredictions.begin(), kPredictions.end(),
-                      [&](const auto& entry) { return entry.first == prediction; })
-      ->second;
+  return prediction == SamplePrediction::kSpline ? "spline" : "triangles";
 }
 
 SamplePrediction prediction_from(const std::string& name) {
-  for (const auto& [prediction, its_name] : kPredictions) {
-    if (name == its_name) return prediction;
+  for (const SamplePrediction prediction : {SamplePrediction::kSpline, SamplePrediction::kTriangles}) {
+    if (name == name_of(prediction)) return prediction;
   }
   throw Error(ErrorCode::kUnsupported, fmt::format("the prediction \"{}\" is not known to this build", name));
-}
-
-bool is_in_integers(SamplePrediction prediction) {
-  return prediction == SamplePrediction::kSpline || prediction == SamplePrediction::kTriangles;
 }
 
 /// JSON has no numbers that are not finite.
@@ -61,13 +45,12 @@ double number_from(const Json& json) {
 }
 
 void check(const LosslessRecord& record, const Metadata& metadata) {
-  const bool fits =
-      record.width == metadata.source.width && record.height == metadata.source.height && record.width >= 1 &&
-      record.height >= 1 && record.rows_per_member >= 1 &&
-      record.rows_per_member <= (std::int64_t{1} << 26U) / record.width + 16 &&
-      std::isfinite(record.mapping.z_offset) && std::isfinite(record.mapping.z_scale) &&
-      record.mapping.z_scale != 0.0 &&
-      (!is_in_integers(record.prediction) || FixedHeights::are_valid(metadata.quantisation, record.fraction_bits));
+  const bool fits = record.width == metadata.source.width && record.height == metadata.source.height &&
+                    record.width >= 1 && record.height >= 1 && record.rows_per_member >= 1 &&
+                    record.rows_per_member <= (std::int64_t{1} << 26U) / record.width + 16 &&
+                    std::isfinite(record.mapping.z_offset) && std::isfinite(record.mapping.z_scale) &&
+                    record.mapping.z_scale != 0.0 &&
+                    FixedHeights::are_valid(metadata.quantisation, record.fraction_bits);
   if (!fits) throw Error(ErrorCode::kCorrupt, "metadata: lossless does not fit the source's record");
 }
 
@@ -103,16 +86,12 @@ ScratchFolder scratch_of(const ArchiveReader& archive, const LosslessRecord& rec
   return scratch_for(job, bytes(false), bytes(true), "restoring the source");
 }
 
-template <typename Mesh>
-Mesh read_mesh(const SamplePredictor::ReadMember& read_member, const char* name, const LosslessRecord& record) {
-  const auto bytes = read_member(name);
-  const std::string where = fmt::format("member \"{}\"", name);
+PlaceMesh read_nodes(const SamplePredictor::ReadNodes& read, const LosslessRecord& record) {
+  const auto bytes = read();
+  const std::string where = fmt::format("member \"{}\"", kNodesName);
   if (!bytes) throw Error(ErrorCode::kCorrupt, where + " is missing");
   try {
-    if constexpr (std::is_same_v<Mesh, PlaceMesh>)
-      return PlaceMesh(record.width, record.height, *bytes);
-    else
-      return positions_from_bytes(record.width, record.height, *bytes);
+    return {record.width, record.height, *bytes};
   } catch (const Error& error) {
     throw error.within(where);
   }
@@ -152,7 +131,7 @@ std::optional<LosslessRecord> record_named(const char* name, const Metadata& met
     record.height = json.at("height").get<std::int64_t>();
     for (const Json& value : json.at("void_values")) record.void_values.push_back(number_from(value));
     record.prediction = prediction_from(json.at("prediction").get<std::string>());
-    if (is_in_integers(record.prediction)) record.fraction_bits = json.at("fraction_bits").get<int>();
+    record.fraction_bits = json.at("fraction_bits").get<int>();
     record.rows_per_member = json.at("rows_per_member").get<std::int64_t>();
     record.residual_bytes = json.at("residual_bytes").get<std::uint64_t>();
     record.sha256 = json.at("sha256").get<std::string>();
@@ -195,57 +174,32 @@ std::string residual_name(std::int64_t first_row) {
 }
 
 bool is_residual(const std::string& name) {
-  return name.starts_with("residual/") && name != kNodesName && name != kPositionsName;
-}
-
-PositionMesh positions_from_bytes(std::int64_t width, std::int64_t height, std::span<const std::byte> bytes) {
-  const std::size_t count = PositionMesh::value_count(width, height);
-  if (bytes.size() != count * sizeof(double)) {
-    throw Error(ErrorCode::kCorrupt, fmt::format("has {} bytes, must have {}", bytes.size(), count * sizeof(double)));
-  }
-  ByteReader reader(bytes);
-  std::vector<double> values(count);
-  for (double& value : values) value = reader.read<double>();
-  return {width, height, std::move(values)};
+  return name.starts_with("residual/") && name != kNodesName;
 }
 
 SamplePredictor::SamplePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation,
                                  ReadTiles read_tiles, const SampleGrid& samples, const LosslessRecord& record,
-                                 const ReadMember& read_member, const ScratchFolder& scratch)
+                                 const ReadNodes& read, const ScratchFolder& scratch)
     : width_(record.width), grid_(grid), heights_(quantisation, record.fraction_bits) {
-  switch (record.prediction) {
-    case SamplePrediction::kSpline:
-      spline_.emplace(grid, wraps_x, quantisation, record.fraction_bits, std::move(read_tiles), samples, scratch);
-      return;
-    case SamplePrediction::kHex:
-    case SamplePrediction::kBarycentric:
-      rows_.emplace(grid, wraps_x, quantisation, std::move(read_tiles), samples,
-                    record.prediction == SamplePrediction::kHex ? RestoreMethod::kHex : RestoreMethod::kBarycentric,
-                    false, std::nullopt, scratch);
-      return;
-    case SamplePrediction::kTriangles:
-      nodes_ = read_mesh<PlaceMesh>(read_member, kNodesName, record);
-      break;
-    case SamplePrediction::kPlaces:
-      positions_ = read_mesh<PositionMesh>(read_member, kPositionsName, record);
-      break;
+  if (record.prediction == SamplePrediction::kSpline) {
+    spline_.emplace(grid, wraps_x, quantisation, record.fraction_bits, std::move(read_tiles), samples, scratch);
+    return;
   }
-  points_.emplace(grid, quantisation, std::move(read_tiles), kTileBytes / 2, false);  // as much again is in hand
+  nodes_ = read_nodes(read, record);
+  points_.emplace(grid, quantisation, std::move(read_tiles), kTileBytes / 2);  // as much again is in hand
 }
 
-template <typename Mesh, typename Place>
-std::vector<Place> SamplePredictor::places(const Mesh& mesh, std::int64_t first, std::int64_t rows) const {
-  std::vector<Place> found(static_cast<std::size_t>(rows * width_));
+std::vector<FixedPlace> SamplePredictor::places(std::int64_t first, std::int64_t rows) const {
+  std::vector<FixedPlace> found(static_cast<std::size_t>(rows * width_));
   const auto width = static_cast<std::size_t>(width_);
   oneapi::tbb::parallel_for(std::int64_t{0}, rows, [&](std::int64_t row) {
-    mesh.row(first + row, std::span(found).subspan(static_cast<std::size_t>(row) * width, width));
+    nodes_->row(first + row, std::span(found).subspan(static_cast<std::size_t>(row) * width, width));
   });
   return found;
 }
 
 RowRange SamplePredictor::tile_rows_needed(std::int64_t first, std::int64_t rows) const {
   if (spline_) return spline_->tile_rows_needed(first, rows);
-  ISOHF_ASSERT(nodes_.has_value());  // what is written today
   RowRange needed{grid_.tile_rows(), -1};
   std::vector<FixedPlace> places(static_cast<std::size_t>(width_));
   for (std::int64_t row = first; row < first + rows; ++row) {
@@ -261,9 +215,7 @@ RowRange SamplePredictor::tile_rows_needed(std::int64_t first, std::int64_t rows
 
 void SamplePredictor::read(std::int64_t first, std::int64_t rows, std::span<double> predicted) {
   if (spline_) return spline_->read(first, rows, predicted);
-  if (rows_) return rows_->read(first, rows, predicted);
-  if (nodes_) return points_->sample(places<PlaceMesh, FixedPlace>(*nodes_, first, rows), heights_, predicted);
-  points_->sample(places<PositionMesh, WorldPoint>(*positions_, first, rows), predicted);
+  points_->sample(places(first, rows), heights_, predicted);
 }
 
 struct SourceRowReader::State {
@@ -273,16 +225,16 @@ struct SourceRowReader::State {
         job(std::move(its_job)),
         surface(
             archive.grid(), archive.metadata().wraps_x, archive.metadata().quantisation, tiles_of(archive),
-            source_grid(archive.metadata().source), record, [&](const char* name) { return mesh_bytes(name); },
+            source_grid(archive.metadata().source), record, [&] { return node_bytes(); },
             scratch_of(archive, record, job)) {}
 
-  /// Of the places' member, which takes eight bytes a value; nullopt where there is none.
-  [[nodiscard]] std::optional<std::vector<std::byte>> mesh_bytes(const char* name) const {
-    const auto found = archive.find_member(name);
+  /// Of the nodes' member, which takes eight bytes a value; nullopt where there is none.
+  [[nodiscard]] std::optional<std::vector<std::byte>> node_bytes() const {
+    const auto found = archive.find_member(kNodesName);
     if (!found) return std::nullopt;
-    if (found->bytes != 8 * PositionMesh::value_count(record.width, record.height))
+    if (found->bytes != 8 * PlaceMesh::value_count(record.width, record.height))
       throw Error(ErrorCode::kCorrupt, fmt::format("{}: member \"{}\" has {} bytes, not those of so many places",
-                                                   archive.path(), name, found->bytes));
+                                                   archive.path(), kNodesName, found->bytes));
     return archive.read_member(*found);
   }
 

@@ -8,9 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "isohf/restore/grid_sampler.h"
 #include "isohf/restore/point_sampler.h"
-#include "isohf/restore/position_mesh.h"
 #include "isohf/restore/predict/fixed_point.h"
 #include "isohf/restore/predict/place_mesh.h"
 #include "isohf/restore/predict/spline_predictor.h"
@@ -37,14 +35,10 @@ inline constexpr const char* kPartLosslessName = "part_lossless";
 [[nodiscard]] RowRange residual_rows_at(const LosslessRecord& record, std::int64_t all_tile_rows,
                                         const RowRange& tile_rows);
 
-/// Where the samples of a source that was projected lie: a PlaceMesh's bytes, or in old archives a PositionMesh's.
+/// Where the samples of a source that was projected lie: a PlaceMesh's bytes.
 inline constexpr const char* kNodesName = "residual/nodes";
-inline constexpr const char* kPositionsName = "residual/places";
 /// Whether a member holds residuals.
 [[nodiscard]] bool is_residual(const std::string& name);
-/// A PositionMesh's values, as doubles. Throws Error{kCorrupt} where the bytes are no mesh of that size.
-[[nodiscard]] PositionMesh positions_from_bytes(std::int64_t width, std::int64_t height,
-                                                std::span<const std::byte> bytes);
 
 /// Predicts the samples of a source, row by row from North to South: on its own grid, or at positions of their own.
 class SamplePredictor {
@@ -52,10 +46,10 @@ class SamplePredictor {
   /// What tiles under samples with places of their own take at most, beside one tile a thread.
   static constexpr std::uint64_t kTileBytes = std::uint64_t{32} << 20U;
 
-  /// As the record says; reads the places' member by read_member(name), nullopt where there is none.
-  using ReadMember = std::function<std::optional<std::vector<std::byte>>(const char* name)>;
+  /// As the record says; `read` gives the bytes of the nodes' member, nullopt if there is none.
+  using ReadNodes = std::function<std::optional<std::vector<std::byte>>()>;
   SamplePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
-                  const SampleGrid& samples, const LosslessRecord& record, const ReadMember& read_member,
+                  const SampleGrid& samples, const LosslessRecord& record, const ReadNodes& read,
                   const ScratchFolder& scratch = {});
 
   /// The rows of tiles that read() reads; none where there are none under the samples.
@@ -64,17 +58,14 @@ class SamplePredictor {
   void read(std::int64_t first, std::int64_t rows, std::span<double> predicted);
 
  private:
-  template <typename Mesh, typename Place>
-  [[nodiscard]] std::vector<Place> places(const Mesh& mesh, std::int64_t first, std::int64_t rows) const;
+  [[nodiscard]] std::vector<FixedPlace> places(std::int64_t first, std::int64_t rows) const;
 
   std::int64_t width_;
   TileGrid grid_;
   FixedHeights heights_;
   std::optional<SplinePredictor> spline_;
-  std::optional<GridSampler> rows_;
   std::optional<PointSampler> points_;
   std::optional<PlaceMesh> nodes_;
-  std::optional<PositionMesh> positions_;
 };
 
 }  // namespace isohf

@@ -134,11 +134,10 @@ void for_each_group(const ReadTiles& read_tiles, TileIndex first, std::int64_t t
 }
 
 PointSampler::PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles,
-                           std::uint64_t memory_bytes, bool snaps, const std::optional<TileRange>& here)
+                           std::uint64_t memory_bytes, const std::optional<TileRange>& here)
     : grid_(grid),
       quantisation_(quantisation),
       read_tiles_(std::move(read_tiles)),
-      snaps_(snaps),
       here_(here.value_or(all_tiles(grid))) {
   const std::uint64_t bytes = quantisation.type == CodeType::kF32 ? 4 : 2;
   const std::uint64_t tile_bytes = static_cast<std::uint64_t>(grid.shape().stored_vertex_count()) * bytes;
@@ -217,7 +216,7 @@ void PointSampler::visit(std::size_t points, const TileOf& tile_of, const Sample
 
 std::int64_t PointSampler::tile_under(WorldPoint point) const {
   // A place on the outline that went through degrees or a map, or was rounded, comes back off it.
-  const double slack = snaps_ ? 0.001 * std::min(2.0 * grid_.sigma_x(), grid_.sigma_z()) : 0.0;
+  const double slack = 0.001 * std::min(2.0 * grid_.sigma_x(), grid_.sigma_z());
   const bool is_inside = std::abs(std::clamp(point.x, 0.0, grid_.world_width()) - point.x) <= slack &&
                          std::abs(std::clamp(point.z, 0.0, grid_.world_height()) - point.z) <= slack;
   return is_inside ? grid_.flat_index(locate(point).tile) : -1;
@@ -250,8 +249,7 @@ void PointSampler::sample(std::span<const WorldPoint> points, std::span<double> 
     const TileSurface surface(grid_, quantisation_, codes, no_scratch);
     for (const Run& run : runs) {
       for (std::size_t i = run.first; i < run.end; ++i) {
-        const Barycentric where = barycentric(grid_.shape(), locate(points[i]).point);
-        elevations[i] = surface.elevation(snaps_ ? snapped(where) : where);
+        elevations[i] = surface.elevation(snapped(barycentric(grid_.shape(), locate(points[i]).point)));
       }
     }
   });

@@ -36,11 +36,9 @@ class PointSampler {
  public:
   /// Keeps at most `memory_bytes` of decoded tiles, and has as much again in hand during a call; one tile in each
   /// thread at least.
-  /// snaps  places on a side or vertex of their triangle need nothing off it (lattice/barycentric.h); not so in
-  ///        predictions of old archives
-  /// here   the tiles that there are; nullopt: all
+  /// here  the tiles that there are; nullopt: all
   PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles, std::uint64_t memory_bytes,
-               bool snaps = true, const std::optional<TileRange>& here = {});
+               const std::optional<TileRange>& here = {});
 
   void sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples);
   void sample(std::span<const WorldPoint> points, std::span<double> elevations);
@@ -67,7 +65,6 @@ class PointSampler {
   TileGrid grid_;
   Quantisation quantisation_;
   ReadTiles read_tiles_;
-  bool snaps_;
   TileRange here_;
   std::size_t capacity_;        ///< tiles to keep
   std::size_t tiles_together_;  ///< decoded at once by one thread

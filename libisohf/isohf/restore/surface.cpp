@@ -167,7 +167,7 @@ struct Surface::State {
       : archive(its_archive),
         job(its_job),
         sampler(archive.grid(), archive.metadata().quantisation, tiles_of(archive),
-                job.memory_bytes > 0 ? job.memory_bytes : kDefaultMemory, true, tiles_here(archive.metadata())),
+                job.memory_bytes > 0 ? job.memory_bytes : kDefaultMemory, tiles_here(archive.metadata())),
         georeference(archive.metadata()) {
     if (job.threads != 0) arena.emplace(job);
   }
@@ -266,14 +266,14 @@ struct RowReader::State {
     if (!grid.goes_by_places()) {
       const int plane = method == RestoreMethod::kPlane ? plane_for(metadata, grid) : 0;
       const TileGrid tiles = metadata.plane_grid(plane);
-      rows.emplace(tiles, metadata.wraps_x, metadata.quantisation, tiles_of(archive, plane), grid, method, true,
+      rows.emplace(tiles, metadata.wraps_x, metadata.quantisation, tiles_of(archive, plane), grid, method,
                    metadata.grid, choose_memory(tiles, method, job), turn_of(metadata),
                    plane == 0 ? std::optional(tiles_here(metadata)) : std::nullopt);
       return;
     }
     georeference.emplace(metadata);
     if (!georeference->has_geo()) refuse_place("degrees");
-    points.emplace(metadata.grid, metadata.quantisation, tiles_of(archive), kTileBytes, true, tiles_here(metadata));
+    points.emplace(metadata.grid, metadata.quantisation, tiles_of(archive), kTileBytes, tiles_here(metadata));
   }
 
   /// As many rows at once as there is room for.

@@ -26,7 +26,7 @@ void ResidualMembers::copy_to(ArchiveWriter& writer) {
     if (found) copy_member(*found->from, found->member, writer, ahead);
     return found ? found->member.compressed_bytes : 0;
   };
-  for (const char* const name : {kNodesName, kPositionsName}) copy(find(name, 0));
+  copy(find(kNodesName, 0));
   record_.residual_bytes = 0;
   for (std::int64_t member = 0; member < members(); ++member) record_.residual_bytes += copy(find(member));
   for (const AssemblyInput& input : inputs_) input.file->close();

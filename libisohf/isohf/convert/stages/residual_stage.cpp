@@ -70,7 +70,7 @@ std::uint64_t residual_stage_memory_bytes(const SourceInfo& info, const Plan& pl
   if (plan.frame.warp) {
     // A position for each sample of a member, tiles that are kept, and one in each thread.
     const double tile_bytes = 8.0 * static_cast<double>(shape.stored_vertex_count());
-    const double mesh = 16.0 * static_cast<double>(PositionMesh::value_count(info.width, info.height));
+    const double mesh = 16.0 * static_cast<double>(PlaceMesh::value_count(info.width, info.height));
     return static_cast<std::uint64_t>(bands + encoding + rows * width * 16.0 + mesh + threads * 2.0 * tile_bytes +
                                       static_cast<double>(SamplePredictor::kTileBytes));
   }
@@ -109,7 +109,7 @@ ResidualStage::ResidualStage(HeightSource& source, const SourceFrame& frame, con
       grid, frame.wraps_x, quantisation, [this](std::span<const TileIndex> tiles) { return read_tiles_(tiles); },
       SampleGrid{frame.width, frame.height, frame.first_sample_x, frame.first_sample_z, frame.spacing_x,
                  frame.spacing_z},
-      record_, [this](const char*) { return nodes_; }, scratch);
+      record_, [this] { return nodes_; }, scratch);
 }
 
 RowRange ResidualStage::tile_rows_needed() const {

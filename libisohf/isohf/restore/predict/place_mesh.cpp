@@ -9,11 +9,12 @@
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
-#include "isohf/restore/position_mesh.h"
 
 namespace isohf {
 namespace {
 
+constexpr std::int64_t kStep = 32;
+constexpr std::int64_t kMostCells = std::int64_t{1} << 20;
 /// Of a cell, in the weights' argument.
 constexpr std::int64_t kCellParts = std::int64_t{1} << 14U;
 /// Nodes further away than this are none.
@@ -71,12 +72,27 @@ std::int64_t level(const std::vector<FixedPlace>& nodes, std::size_t i, std::siz
 
 }  // namespace
 
+std::int64_t PlaceMesh::cells(std::int64_t samples, std::int64_t step) {
+  return std::max<std::int64_t>((samples - 1 + step - 1) / step, 3);
+}
+
+std::int64_t PlaceMesh::step(std::int64_t columns, std::int64_t rows) {
+  std::int64_t step = kStep;
+  while (cells(columns, step) > kMostCells / cells(rows, step)) step *= 2;
+  return step;
+}
+
+std::size_t PlaceMesh::value_count(std::int64_t columns, std::int64_t rows) {
+  const std::int64_t between = step(columns, rows);
+  return 2 * static_cast<std::size_t>(cells(columns, between) + 1) * static_cast<std::size_t>(cells(rows, between) + 1);
+}
+
 PlaceMesh::PlaceMesh(std::int64_t columns, std::int64_t rows, const TileGrid& grid,
                      const std::function<WorldPoint(double column, double row)>& at)
     : columns_(columns),
       rows_(rows),
-      across_(PositionMesh::cells(columns, PositionMesh::step(columns, rows))),
-      down_(PositionMesh::cells(rows, PositionMesh::step(columns, rows))) {
+      across_(cells(columns, step(columns, rows))),
+      down_(cells(rows, step(columns, rows))) {
   const auto position = [](std::int64_t node, std::int64_t cells, std::int64_t samples) {
     return static_cast<double>(node) * static_cast<double>(samples - 1) / static_cast<double>(cells);
   };
@@ -96,9 +112,9 @@ PlaceMesh::PlaceMesh(std::int64_t columns, std::int64_t rows, const TileGrid& gr
 PlaceMesh::PlaceMesh(std::int64_t columns, std::int64_t rows, std::span<const std::byte> bytes)
     : columns_(columns),
       rows_(rows),
-      across_(PositionMesh::cells(columns, PositionMesh::step(columns, rows))),
-      down_(PositionMesh::cells(rows, PositionMesh::step(columns, rows))) {
-  const std::size_t count = PositionMesh::value_count(columns, rows);
+      across_(cells(columns, step(columns, rows))),
+      down_(cells(rows, step(columns, rows))) {
+  const std::size_t count = value_count(columns, rows);
   if (bytes.size() != count * sizeof(std::int64_t)) {
     throw Error(ErrorCode::kCorrupt,
                 fmt::format("has {} bytes, must have {}", bytes.size(), count * sizeof(std::int64_t)));

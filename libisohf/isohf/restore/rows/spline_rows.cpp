@@ -126,9 +126,8 @@ void quintic_prefilter(std::span<double> line) {
   for (double& value : line) value *= 120.0;
 }
 
-StandIn stand_in(std::int64_t k, std::int64_t count, Beyond beyond) {
+StandIn stand_in(std::int64_t k, std::int64_t count) {
   if (k >= 0 && k < count) return {k};
-  if (beyond == Beyond::kMirrored) return {mirror_index(k, count)};
   // Two ends further on the line is itself again, raised by twice what it rises.
   const std::int64_t end = count - 1;
   const std::int64_t in_turn = (k % (2 * end) + 2 * end) % (2 * end);
@@ -137,9 +136,9 @@ StandIn stand_in(std::int64_t k, std::int64_t count, Beyond beyond) {
   return {2 * end - in_turn, -1.0, -2.0 * turns, 2.0 + 2.0 * turns};
 }
 
-SplineRows::SplineRows(const TileGrid& grid, const std::vector<double>& columns_x, bool wraps_x, Beyond beyond,
+SplineRows::SplineRows(const TileGrid& grid, const std::vector<double>& columns_x, bool wraps_x,
                        const ScratchFolder& scratch)
-    : grid_(grid), wraps_x_(wraps_x), beyond_(beyond), taps_(columns_x.size(), scratch) {
+    : grid_(grid), wraps_x_(wraps_x), taps_(columns_x.size(), scratch) {
   // Even k are odd z, with vertices at object-space x = -1, 1, ...; odd k have them at -2, 0, ...
   for (const std::int64_t parity : {0, 1}) {
     taps_.add(parity);
@@ -147,7 +146,7 @@ SplineRows::SplineRows(const TileGrid& grid, const std::vector<double>& columns_
     for (std::size_t c = 0; c < columns_x.size(); ++c) {
       const double half_steps = columns_x[c] / grid.sigma_x();
       block.push_back(quintic_weights((half_steps + static_cast<double>(parity + 1)) / 2.0));
-      if (wraps_x || beyond == Beyond::kSloped) block.back().first += wraps_x ? kRound - 1 : kRound;
+      block.back().first += wraps_x ? kRound - 1 : kRound;
       if (block.size() < kBlock && c + 1 < columns_x.size()) continue;
       taps_.write(parity, c + 1 - block.size(), block);
       block.clear();
@@ -159,8 +158,8 @@ std::int64_t SplineRows::tile_row_of(std::int64_t row) const {
   return std::clamp<std::int64_t>((row - 1) / grid_.shape().cell_rows(), 0, grid_.tile_rows() - 1);
 }
 
-/// The vertices of a lattice row, padding included; of a row that goes round kRound more on either side instead, of one
-/// whose slope goes on besides.
+/// The vertices of a lattice row, padding included, and kRound more on either side that continue its slope; of a row that
+/// goes round kRound more instead of the padding.
 std::vector<double> SplineRows::line_of(std::int64_t row, std::span<const double> vertices) const {
   const std::int64_t columns = grid_.shape().columns();
   const std::int64_t cells = grid_.shape().cell_columns();
@@ -177,12 +176,11 @@ std::vector<double> SplineRows::line_of(std::int64_t row, std::span<const double
       std::copy(from, from + columns - 1, to);
     }
   }
-  if (!wraps_x_ && beyond_ == Beyond::kMirrored) return line;
   std::vector<double> round;
   if (!wraps_x_) {
     const auto count = static_cast<std::int64_t>(line.size());
     for (std::int64_t k = -kRound; k < count + kRound; ++k) {
-      const StandIn from = stand_in(k, count, beyond_);
+      const StandIn from = stand_in(k, count);
       double height = from.sign * line[static_cast<std::size_t>(from.at)];
       // An end that is void says nothing of the other.
       if (from.first != 0.0) height += from.first * line.front();

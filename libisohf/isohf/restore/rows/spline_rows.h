@@ -33,11 +33,8 @@ struct QuinticResponse {
 /// Samples -> coefficients of the quintic B-spline through them, in place, mirrored at both ends. O(n).
 void quintic_prefilter(std::span<double> line);
 
-/// What stands for row or vertex k of a line of `count` >= 2, any k, where lines go on beyond their ends.
-enum class Beyond {
-  kMirrored,  ///< as predictions of old archives have it: slopes flatten towards the ends
-  kSloped,    ///< turned about the end by half a circle: planes go on
-};
+/// Stands for row or vertex k of a line of `count` >= 2, any k. Beyond its ends a line is turned about the end by half a
+/// circle, so that planes go on.
 /// sign * line[at] + first * line[0] + last * line[count - 1]
 struct StandIn {
   std::int64_t at;
@@ -45,7 +42,7 @@ struct StandIn {
   double first = 0.0;
   double last = 0.0;
 };
-[[nodiscard]] StandIn stand_in(std::int64_t k, std::int64_t count, Beyond beyond);
+[[nodiscard]] StandIn stand_in(std::int64_t k, std::int64_t count);
 
 /// The rows of the whole lattice, padding rows included: row k lies at object-space z = k - 1.
 class SplineRows {
@@ -53,8 +50,7 @@ class SplineRows {
   /// columns_x [n]  the world x of the columns that are wanted, increasing
   /// wraps_x        rows go all the way round: behind their East end they begin again
   /// scratch        keeps their weights where memory has no room for them
-  SplineRows(const TileGrid& grid, const std::vector<double>& columns_x, bool wraps_x, Beyond beyond,
-             const ScratchFolder& scratch);
+  SplineRows(const TileGrid& grid, const std::vector<double>& columns_x, bool wraps_x, const ScratchFolder& scratch);
 
   [[nodiscard]] std::int64_t rows() const { return grid_.tile_rows() * grid_.shape().cell_rows() + 3; }
   [[nodiscard]] std::int64_t tile_row_of(std::int64_t row) const;
@@ -78,7 +74,6 @@ class SplineRows {
 
   TileGrid grid_;
   bool wraps_x_;
-  Beyond beyond_;
   KeptRows<QuinticWeights> taps_;  ///< on padding-first rows (even k), and on odd ones
 };
 
