@@ -152,7 +152,6 @@ TEST_F(ArchiveReaderTest, SaysThatAnotherProgramCutTheOpenFile) {
     std::filesystem::resize_file(path(), left);
     const TileIndex last{0, 20};
     EXPECT_THAT(io_error_of([&] { (void)reader.read_tile(last); }), is_told);
-    EXPECT_THAT(io_error_of([&] { (void)reader.read_tiles(std::array{last}); }), is_told);
     EXPECT_THAT(io_error_of([&] { (void)reader.members(); }), is_told);
     EXPECT_THAT(io_error_of([&] { (void)knows_members.read_member(member); }), is_told);
     EXPECT_THAT(reader.check_structure(), testing::Contains(is_told));

@@ -221,7 +221,6 @@ TEST_F(Resume, HasCoarsePlanesThatComeBackTileByTile) {
   for (const auto& [plane, tile, flat] : {std::tuple(1, TileIndex{0, 0}, 2), {1, {1, 0}, 1}, {2, {0, 0}, 0}}) {
     const TileCodes expected = test::tile_of_archive(grid_, CodeType::kU16, flat);
     EXPECT_EQ(archive.read_tile(tile, plane), expected);
-    EXPECT_EQ(archive.read_tiles(std::array{tile}, plane).front(), expected);
     const auto digest = archive.tile_digest(tile, plane);
     ASSERT_TRUE(digest.has_value());
     EXPECT_TRUE(std::ranges::equal(*digest, tile_at(grid_, flat).content_digest));

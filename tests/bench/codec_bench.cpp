@@ -14,7 +14,6 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_decoder.h"
 #include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/deflate/deflate.h"
@@ -148,7 +147,7 @@ int run(int argc, char** argv) {
     }
   }
   const double samples = static_cast<double>(shape.stored_vertex_count()) * static_cast<double>(tiles.size());
-  double encode_seconds = 1e9, decode_seconds = 1e9, plain_seconds = 1e9, lanes_seconds = 1e9, inflate_seconds = 1e9;
+  double encode_seconds = 1e9, decode_seconds = 1e9, plain_seconds = 1e9, inflate_seconds = 1e9;
   std::size_t bytes = 0;
   for (int repeat = 0; repeat < repeats; ++repeat) {
     double start = now();
@@ -176,26 +175,13 @@ int run(int argc, char** argv) {
     };
     time_decoding(plain_seconds, [&](std::size_t i) { return decode_tile_slowly(shape, tiles[i].type, payloads[i]); });
     time_decoding(decode_seconds, [&](std::size_t i) { return decode_tile(shape, tiles[i].type, payloads[i]); });
-    const double from = now();
-    for (std::size_t i = 0; i < tiles.size(); i += isohf::kBatchLanes) {
-      const std::size_t count = std::min(isohf::kBatchLanes, tiles.size() - i);
-      std::array<isohf::TileCodes, isohf::kBatchLanes> decoded;
-      std::array<bool, isohf::kBatchLanes> is_decoded{};
-      std::array<std::span<const std::byte>, isohf::kBatchLanes> group;
-      for (std::size_t k = 0; k < count; ++k) group[k] = payloads[i + k];
-      decode_batch(shape, tiles[i].type, std::span(group).first(count), std::span(decoded).first(count),
-                   std::span(is_decoded).first(count));
-      for (std::size_t k = 0; k < count; ++k) same &= !is_decoded[k] || are_same(decoded[k], tiles[i + k]);
-    }
-    lanes_seconds = std::min(lanes_seconds, seconds_since(from));
     if (!same) fmt::print("DIFFERENT\n");
   }
   fmt::print(
       "{} tiles, {:.0f} samples: {:.4f} bits/sample; encode {:.1f} M samples/s, inflate {:.1f}, decode {:.1f}, "
-      "plainly {:.1f}, eight at once {:.1f}\n",
+      "plainly {:.1f}\n",
       tiles.size(), samples, 8.0 * static_cast<double>(bytes) / samples, samples / encode_seconds / 1e6,
-      samples / inflate_seconds / 1e6, samples / decode_seconds / 1e6, samples / plain_seconds / 1e6,
-      samples / lanes_seconds / 1e6);
+      samples / inflate_seconds / 1e6, samples / decode_seconds / 1e6, samples / plain_seconds / 1e6);
   return 0;
 }
 

@@ -7,7 +7,6 @@
 
 #include "isohf/archive/codec/predict/sample_lattice.h"
 #include "isohf/archive/codec/residuals/residual_streams.h"
-#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/codec/tile_encoder.h"
 
@@ -15,7 +14,7 @@
 namespace isohf::bench {
 
 inline const TileShape kShape = TileShape::make(212, 243, 4);
-inline constexpr std::size_t kTiles = kBatchLanes;
+inline constexpr std::size_t kTiles = 8;
 
 /// Hills with valleys and noise that grows with their slope: contexts differ, as on real terrain.
 [[nodiscard]] std::vector<float> terrain(std::size_t tile);

@@ -2,13 +2,11 @@
 
 #include <benchmark/benchmark.h>
 
-#include <array>
 #include <vector>
 
 #include "bench/coded_tiles.h"
 #include "isohf/archive/codec/residuals/pair_coding.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/simd/residual_expander.h"
 #include "isohf/archive/codec/tile_decoder.h"
 #include "isohf/archive/codec/tile_encoder.h"
@@ -61,23 +59,6 @@ void expand(benchmark::State& state) {
 }
 BENCHMARK(expand)->Name("extra bits to symbols");
 
-void decode_side_by_side(benchmark::State& state) {
-  const Coded& of = coded(static_cast<CodeType>(state.range(1)));
-  const auto count = static_cast<std::size_t>(state.range(0));
-  const std::vector<std::span<const std::byte>> payloads(of.payloads.begin(),
-                                                         of.payloads.begin() + static_cast<std::ptrdiff_t>(count));
-  for (auto _ : state) {
-    std::vector<TileCodes> tiles(count);
-    std::array<bool, kTiles> is_decoded{};
-    decode_batch(kShape, of.type, payloads, tiles, std::span(is_decoded).first(count));
-    if (!is_decoded[0]) state.SkipWithError("is not decoded in lanes");
-    benchmark::DoNotOptimize(tiles.data());
-  }
-  set_samples(state, count * Inside::samples(), of.type);
-  state.SetLabel(to_string(of.type));
-}
-BENCHMARK(decode_side_by_side)->Name("decode, tiles side by side")->ArgsProduct({{1, kTiles}, {0, 1, 2}});
-
 void decode_one(benchmark::State& state) {
   const Coded& of = coded(static_cast<CodeType>(state.range(0)), static_cast<PayloadVersion>(state.range(1)));
   for (auto _ : state) {
@@ -94,13 +75,8 @@ void decode_all(benchmark::State& state) {
   std::vector<std::vector<std::byte>> payloads = of.payloads;
   for (auto _ : state) {
     for (std::size_t i = 0; i < kTiles; ++i) inflate_exactly(of.encoded[i].deflated, payloads[i]);
-    const std::vector<std::span<const std::byte>> spans(payloads.begin(), payloads.end());
-    std::vector<TileCodes> tiles(kTiles);
-    std::array<bool, kTiles> is_decoded{};
-    decode_batch(kShape, of.type, spans, tiles, is_decoded);
-    for (std::size_t i = 0; i < kTiles; ++i) {
-      if (!is_decoded[i]) tiles[i] = decode_tile(kShape, of.type, payloads[i]);
-    }
+    std::vector<TileCodes> tiles;
+    for (const std::vector<std::byte>& payload : payloads) tiles.push_back(decode_tile(kShape, of.type, payload));
     benchmark::DoNotOptimize(tiles.data());
   }
   set_samples(state, kTiles * Inside::samples(), of.type);

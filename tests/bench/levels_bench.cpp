@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "isohf/archive.h"
-#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/codec/tile_decoder.h"
 #include "isohf/archive/codec/tile_encoder.h"
@@ -51,17 +50,9 @@ std::vector<TileCodes> tiles_of(const isohf::ArchiveReader& archive) {
 
 void decode(const isohf::TileShape& shape, const std::vector<TileCodes>& tiles,
             const std::vector<std::vector<std::byte>>& payloads) {
-  for (std::size_t i = 0; i < tiles.size(); i += isohf::kBatchLanes) {
-    const std::size_t count = std::min(isohf::kBatchLanes, tiles.size() - i);
-    const std::vector<std::span<const std::byte>> group(payloads.begin() + static_cast<std::ptrdiff_t>(i),
-                                                        payloads.begin() + static_cast<std::ptrdiff_t>(i + count));
-    std::vector<TileCodes> decoded(count);
-    std::array<bool, isohf::kBatchLanes> is_decoded{};
-    decode_batch(shape, tiles[i].type, group, decoded, std::span(is_decoded).first(count));
-    for (std::size_t k = 0; k < count; ++k) {
-      if (!is_decoded[k]) decoded[k] = decode_tile(shape, tiles[i].type, group[k]);
-      if (decoded[k].codes != tiles[i + k].codes) throw isohf::Error(isohf::ErrorCode::kCorrupt, "decodes wrongly");
-    }
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const TileCodes decoded = decode_tile(shape, tiles[i].type, payloads[i]);
+    if (decoded.codes != tiles[i].codes) throw isohf::Error(isohf::ErrorCode::kCorrupt, "decodes wrongly");
   }
 }
 

@@ -1,6 +1,5 @@
 // Any bytes are a tile payload or an error, for every sample type and both versions. The first byte chooses shape and type.
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -8,7 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_decoder.h"
 #include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/container/content_hash.h"
@@ -41,12 +39,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const isohf::TileShape& shape = shapes[data[0] % 3];
   const CodeType type = types[data[0] / 3 % 3];
   const auto payload = std::as_bytes(std::span<const std::uint8_t>(data, size)).subspan(1);
-  // Side by side it is decoded to the same, or not.
-  const std::array<std::span<const std::byte>, 2> twice = {payload, payload};
-  std::array<isohf::TileCodes, 2> lanes;
-  std::array<bool, 2> is_decoded{};
-  decode_batch(shape, type, twice, lanes, is_decoded);
-  if (is_decoded[0] != is_decoded[1]) std::abort();
   if (digest_by(isohf::decode_tile, shape, type, payload) !=
       digest_by(isohf::decode_tile_slowly, shape, type, payload)) {
     std::abort();
@@ -61,11 +53,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       isohf::inflate_exactly(encoded.deflated, written);
       if (digest_by(isohf::decode_tile, shape, type, written) != encoded.content_digest) std::abort();
     }
-    for (const isohf::TileCodes& lane : lanes) {
-      if (is_decoded[0] && tile_content_digest(lane) != encoded.content_digest) std::abort();
-    }
   } catch (const isohf::Error&) {
-    if (is_decoded[0]) std::abort();
   }
   return 0;
 }

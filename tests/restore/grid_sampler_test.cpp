@@ -53,7 +53,7 @@ TEST(QuinticSpline, ResponseIsTheFilterAndTheSplineInOne) {
 template <typename Height>
 GridSampler surface_of(const TileGrid& grid, const SampleGrid& samples, RestoreMethod method, Height height,
                        bool wraps_x = false, const ScratchFolder& scratch = {}) {
-  const auto read_one = [grid, height](TileIndex tile) {
+  const ReadTile read = [grid, height](TileIndex tile) {
     TileCodes codes;
     codes.type = CodeType::kF32;
     for (int r = 0; r < grid.shape().rows(); ++r) {
@@ -64,12 +64,7 @@ GridSampler surface_of(const TileGrid& grid, const SampleGrid& samples, RestoreM
     }
     return codes;
   };
-  const ReadTiles read = [read_one](std::span<const TileIndex> tiles) {
-    std::vector<TileCodes> all;
-    for (const TileIndex tile : tiles) all.push_back(read_one(tile));
-    return all;
-  };
-  return {grid, wraps_x, {CodeType::kF32, 0.0, 1.0}, read, samples, method, true, std::nullopt, scratch};
+  return {grid, wraps_x, {CodeType::kF32, 0.0, 1.0}, read, samples, method, std::nullopt, scratch};
 }
 
 TileGrid three_by_two() {

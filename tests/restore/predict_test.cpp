@@ -77,25 +77,20 @@ struct Field {
     return {first + 2 * mirror_index(column, kTiles * shape.cell_columns() + (is_odd ? 3 : 2)),
             mirror_index(row, kTiles * shape.cell_rows() + 3) - 1};
   }
-  [[nodiscard]] std::vector<TileCodes> read(std::span<const TileIndex> tiles) const {
-    std::vector<TileCodes> found;
-    for (const TileIndex tile : tiles) {
-      TileCodes codes{CodeType::kU16, {}, {}};
-      for (int r = 0; r < grid.shape().rows(); ++r) {
-        for (int c = 0; c < grid.shape().columns(); ++c) {
-          const LatticeVertex vertex = grid.lattice_vertex(tile, {c, r});
-          const WorldPoint at = inner.world_from_lattice(around_tiles > 0 ? mirrored(vertex) : vertex);
-          const bool is_void = has_hole && std::hypot(at.x - 70.0, at.z - 50.0) < 11.0;
-          codes.codes.push_back(is_void ? 65535
-                                        : static_cast<std::uint16_t>(std::lround((height(at) + 300.0) * 100.0)));
-        }
+  [[nodiscard]] TileCodes read(TileIndex tile) const {
+    TileCodes codes{CodeType::kU16, {}, {}};
+    for (int r = 0; r < grid.shape().rows(); ++r) {
+      for (int c = 0; c < grid.shape().columns(); ++c) {
+        const LatticeVertex vertex = grid.lattice_vertex(tile, {c, r});
+        const WorldPoint at = inner.world_from_lattice(around_tiles > 0 ? mirrored(vertex) : vertex);
+        const bool is_void = has_hole && std::hypot(at.x - 70.0, at.z - 50.0) < 11.0;
+        codes.codes.push_back(is_void ? 65535 : static_cast<std::uint16_t>(std::lround((height(at) + 300.0) * 100.0)));
       }
-      found.push_back(codes);
     }
-    return found;
+    return codes;
   }
-  [[nodiscard]] ReadTiles reader() const {
-    return [this](std::span<const TileIndex> tiles) { return read(tiles); };
+  [[nodiscard]] ReadTile reader() const {
+    return [this](TileIndex tile) { return read(tile); };
   }
 };
 

@@ -124,9 +124,6 @@ class ArchiveReader {
   /// Decodes one tile; a tile that is not stored comes back wholly void. Throws Error{kCorrupt} naming tile and byte.
   [[nodiscard]] TileCodes read_tile(TileIndex tile, int plane = 0) const;
 
-  /// Several at once, which takes less time than one after the other. Throws for the first that cannot be read.
-  [[nodiscard]] std::vector<TileCodes> read_tiles(std::span<const TileIndex> tiles, int plane = 0) const;
-
   /// The same as elevations in vertical units, NaN where void. C*R doubles.
   [[nodiscard]] std::vector<double> read_elevations(TileIndex tile, int plane = 0) const;
 

@@ -110,7 +110,7 @@ class Surface {
   Surface(const Surface&) = delete;
   Surface& operator=(const Surface&) = delete;
 
-  /// A point that is NaN lies outside. Throws as ArchiveReader::read_tiles does. One call at a time.
+  /// A point that is NaN lies outside. Throws as ArchiveReader::read_tile does. One call at a time.
   [[nodiscard]] SurfaceSample at(WorldPoint point);
   /// Throws Error{kInvalidArgument} where the archive's longitudes and latitudes are not known.
   [[nodiscard]] SurfaceSample at(GeoPoint point);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <mutex>
 #include <string_view>
@@ -11,7 +10,6 @@
 #include <utility>
 
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/codec/tile_decoder.h"
 #include "isohf/archive/container/archive_directory.h"
@@ -355,49 +353,6 @@ TileCodes ArchiveReader::read_tile(TileIndex tile, int plane) const {
                                    plane == 0 ? "" : fmt::format("plane {}: ", plane), tile.column, tile.row,
                                    entry.offset_bytes));
   }
-}
-
-std::vector<TileCodes> ArchiveReader::read_tiles(std::span<const TileIndex> tiles, int plane) const {
-  std::vector<TileCodes> codes(tiles.size());
-  for (std::size_t begin = 0; begin < tiles.size(); begin += kBatchLanes) {
-    const std::size_t count = std::min(kBatchLanes, tiles.size() - begin);
-    std::array<std::vector<std::byte>, kBatchLanes> payloads;
-    std::array<std::span<const std::byte>, kBatchLanes> spans;
-    std::array<std::size_t, kBatchLanes> place{};
-    std::size_t lanes = 0;
-    for (std::size_t i = begin; i < begin + count; ++i) {
-      const TileEntry entry = tile_entry(tiles[i], plane);
-      if (!entry.stored) {
-        codes[i] = void_tile(grid().shape(), metadata().quantisation);
-        continue;
-      }
-      try {
-        payloads[lanes] = state_->payload(entry, tiles[i], plane);
-      } catch (const Error&) {
-        codes[i] = read_tile(tiles[i], plane);  // tells which tile and why
-        continue;
-      }
-      spans[lanes] = payloads[lanes];
-      place[lanes++] = i;
-    }
-    std::array<TileCodes, kBatchLanes> decoded;
-    std::array<bool, kBatchLanes> is_decoded{};
-    decode_batch(grid().shape(), metadata().quantisation.type, std::span(spans).first(lanes),
-                 std::span(decoded).first(lanes), std::span(is_decoded).first(lanes));
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      const std::size_t i = place[lane];
-      if (is_decoded[lane]) {
-        codes[i] = std::move(decoded[lane]);
-        continue;
-      }
-      try {
-        codes[i] = decode_tile(grid().shape(), metadata().quantisation.type, spans[lane]);
-      } catch (const Error&) {
-        codes[i] = read_tile(tiles[i], plane);  // tells which tile and why
-      }
-    }
-  }
-  return codes;
 }
 
 bool ArchiveReader::zlib_reads(TileIndex tile, int plane) const {

@@ -15,7 +15,7 @@ namespace isohf {
 namespace {
 
 constexpr const char* kPlanesFolder = "planes/";
-/// In each thread, of each vertex of eight tiles that are decoded side by side.
+/// In each thread, of each vertex of the tiles that are read together.
 constexpr double kBatchBytesPerVertex = 8.0 * 4.0;
 /// Of each tile of a row.
 constexpr double kBytesPerRowTile = 100.0;

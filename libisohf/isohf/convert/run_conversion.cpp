@@ -452,16 +452,12 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
         writer.flush_tiles();
         planes.reset();
         if (memory.residuals_in_scratch) give_back_freed_memory();
-        const auto read_tiles = [&](std::span<const TileIndex> tiles) {
-          std::vector<TileCodes> codes;
-          for (const TileIndex tile : tiles) {
-            const bool is_beside = around && around->holds(tile);
-            ISOHF_ASSERT(is_beside || shard == nullptr || (tile.row >= shard->first_row && tile.row < shard->end_row));
-            codes.push_back(is_beside ? around->codes(tile) : writer.read_tile(tile, conversion.quantisation));
-          }
-          return codes;
+        const auto read_tile = [&](TileIndex tile) {
+          const bool is_beside = around && around->holds(tile);
+          ISOHF_ASSERT(is_beside || shard == nullptr || (tile.row >= shard->first_row && tile.row < shard->end_row));
+          return is_beside ? around->codes(tile) : writer.read_tile(tile, conversion.quantisation);
         };
-        lossless = residuals->write(read_tiles, memory.members_at_once,
+        lossless = residuals->write(read_tile, memory.members_at_once,
                                     shard != nullptr ? shard->samples_sha256 : std::nullopt, writer, job);
       }
     });

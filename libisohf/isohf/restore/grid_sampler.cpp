@@ -79,7 +79,7 @@ struct GridSampler::Block {
   RowParts<char> near_void;
 };
 
-GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
+GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTile read_tile,
                          const SampleGrid& samples, RestoreMethod method, const std::optional<TileGrid>& world,
                          const ScratchFolder& scratch, const std::optional<Turn>& turn,
                          const std::optional<TileRange>& here)
@@ -103,7 +103,7 @@ GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation&
   // Splines run along whole rows, triangles need what is under them.
   const bool needs_all = method_ == RestoreMethod::kHex;
   const Tiles under = needs_all ? Tiles{0, grid.tile_columns()} : tiles_under(0, samples.width);
-  tiles_.emplace(grid, quantisation, std::move(read_tiles), under.first, under.first + under.count - 1, scratch);
+  tiles_.emplace(grid, quantisation, std::move(read_tile), under.first, under.first + under.count - 1, scratch);
 }
 
 GridSampler::Tiles GridSampler::tiles_under(std::int64_t first, std::int64_t columns) const {

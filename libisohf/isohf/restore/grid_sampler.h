@@ -31,7 +31,7 @@ class GridSampler {
   /// scratch  keeps tile rows and lattice rows where memory has no room for them
   /// here     the tiles that there are; nullopt: all
   /// turn     columns that miss the ground are looked for some turns away
-  GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
+  GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTile read_tile,
               const SampleGrid& samples, RestoreMethod method, const std::optional<TileGrid>& world = {},
               const ScratchFolder& scratch = {}, const std::optional<Turn>& turn = {},
               const std::optional<TileRange>& here = {});

@@ -178,15 +178,15 @@ bool is_residual(const std::string& name) {
 }
 
 SamplePredictor::SamplePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation,
-                                 ReadTiles read_tiles, const SampleGrid& samples, const LosslessRecord& record,
+                                 ReadTile read_tile, const SampleGrid& samples, const LosslessRecord& record,
                                  const ReadNodes& read, const ScratchFolder& scratch)
     : width_(record.width), grid_(grid), heights_(quantisation, record.fraction_bits) {
   if (record.prediction == SamplePrediction::kSpline) {
-    spline_.emplace(grid, wraps_x, quantisation, record.fraction_bits, std::move(read_tiles), samples, scratch);
+    spline_.emplace(grid, wraps_x, quantisation, record.fraction_bits, std::move(read_tile), samples, scratch);
     return;
   }
   nodes_ = read_nodes(read, record);
-  points_.emplace(grid, quantisation, std::move(read_tiles), kTileBytes / 2);  // as much again is in hand
+  points_.emplace(grid, quantisation, std::move(read_tile), kTileBytes / 2);  // as much again is in hand
 }
 
 std::vector<FixedPlace> SamplePredictor::places(std::int64_t first, std::int64_t rows) const {

@@ -48,7 +48,7 @@ class SamplePredictor {
 
   /// As the record says; `read` gives the bytes of the nodes' member, nullopt if there is none.
   using ReadNodes = std::function<std::optional<std::vector<std::byte>>()>;
-  SamplePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTiles read_tiles,
+  SamplePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTile read_tile,
                   const SampleGrid& samples, const LosslessRecord& record, const ReadNodes& read,
                   const ScratchFolder& scratch = {});
 

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/metadata/part_record.h"
 #include "isohf/base/assert.h"
 #include "isohf/surface/shade/normals.h"
@@ -114,37 +113,26 @@ double elevation_at(const TileShape& shape, const TileCodes& codes, const Quanti
   return sum;
 }
 
-ReadTiles tiles_of(const ArchiveReader& archive, int plane) {
-  return [&archive, plane](std::span<const TileIndex> tiles) { return archive.read_tiles(tiles, plane); };
+ReadTile tiles_of(const ArchiveReader& archive, int plane) {
+  return [&archive, plane](TileIndex tile) { return archive.read_tile(tile, plane); };
 }
 
-void for_each_group(const ReadTiles& read_tiles, TileIndex first, std::int64_t tiles,
-                    const std::function<void(std::int64_t, std::span<const TileCodes>)>& use) {
-  const auto threads = static_cast<std::int64_t>(oneapi::tbb::this_task_arena::max_concurrency());
-  const std::int64_t together = std::clamp<std::int64_t>(tiles / threads, 1, kBatchLanes);
-  oneapi::tbb::parallel_for(std::int64_t{0}, (tiles + together - 1) / together, [&](std::int64_t group) {
-    const std::int64_t from = group * together;
-    std::vector<TileIndex> indices;
-    for (std::int64_t tile = from; tile < std::min(from + together, tiles); ++tile) {
-      indices.push_back({first.column + tile, first.row});
-    }
-    const std::vector<TileCodes> codes = read_tiles(indices);
-    use(from, codes);
+void for_each_tile(const ReadTile& read_tile, TileIndex first, std::int64_t tiles,
+                   const std::function<void(std::int64_t, const TileCodes&)>& use) {
+  oneapi::tbb::parallel_for(std::int64_t{0}, tiles, [&](std::int64_t tile) {
+    use(tile, read_tile({first.column + tile, first.row}));
   });
 }
 
-PointSampler::PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles,
+PointSampler::PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile,
                            std::uint64_t memory_bytes, const std::optional<TileRange>& here)
     : grid_(grid),
       quantisation_(quantisation),
-      read_tiles_(std::move(read_tiles)),
+      read_tile_(std::move(read_tile)),
       here_(here.value_or(all_tiles(grid))) {
   const std::uint64_t bytes = quantisation.type == CodeType::kF32 ? 4 : 2;
   const std::uint64_t tile_bytes = static_cast<std::uint64_t>(grid.shape().stored_vertex_count()) * bytes;
-  const auto threads = static_cast<std::uint64_t>(oneapi::tbb::this_task_arena::max_concurrency());
   capacity_ = static_cast<std::size_t>(std::max<std::uint64_t>(1, memory_bytes / tile_bytes));
-  // Large tiles in all lanes of all threads would take more than is to be kept.
-  tiles_together_ = std::clamp<std::size_t>(capacity_ / threads, 1, kBatchLanes);
 }
 
 PointSampler::Codes PointSampler::kept(std::int64_t tile) {
@@ -170,7 +158,7 @@ PointSampler::Codes PointSampler::codes(TileIndex tile) {
   const std::int64_t index = grid_.flat_index(tile);
   Codes found = kept(index);
   if (found) return found;
-  found = std::make_shared<const TileCodes>(std::move(read_tiles_({&tile, 1}).front()));
+  found = std::make_shared<const TileCodes>(read_tile_(tile));
   keep(index, found);
   return found;
 }
@@ -194,24 +182,8 @@ void PointSampler::visit(std::size_t points, const TileOf& tile_of, const Sample
     tiles.emplace_back(runs.data() + first, i - first);
     first = i;
   }
-  const std::size_t groups = (tiles.size() + tiles_together_ - 1) / tiles_together_;
-  oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
-    const std::size_t first = group * tiles_together_;
-    const auto of_group = std::span(tiles).subspan(first, std::min(tiles_together_, tiles.size() - first));
-    std::vector<Codes> codes;
-    std::vector<TileIndex> missing;
-    for (const auto& tile : of_group) {
-      codes.push_back(kept(tile.front().tile));
-      if (!codes.back()) missing.push_back(grid_.tile_at(tile.front().tile));
-    }
-    std::vector<TileCodes> read = missing.empty() ? std::vector<TileCodes>{} : read_tiles_(missing);
-    for (std::size_t i = 0, next = 0; i < codes.size(); ++i) {
-      if (codes[i]) continue;
-      codes[i] = std::make_shared<const TileCodes>(std::move(read[next++]));
-      keep(of_group[i].front().tile, codes[i]);
-    }
-    for (std::size_t i = 0; i < codes.size(); ++i) sample(*codes[i], of_group[i]);
-  });
+  oneapi::tbb::parallel_for(std::size_t{0}, tiles.size(),
+                            [&](std::size_t i) { sample(*codes(grid_.tile_at(tiles[i].front().tile)), tiles[i]); });
 }
 
 std::int64_t PointSampler::tile_under(WorldPoint point) const {

@@ -20,14 +20,14 @@ namespace isohf {
 [[nodiscard]] double elevation_at(const TileShape& shape, const TileCodes& codes, const Quantisation& quantisation,
                                   const Barycentric& where);
 
-/// Decodes several tiles, void ones too; called from many threads at once.
-using ReadTiles = std::function<std::vector<TileCodes>(std::span<const TileIndex>)>;
-[[nodiscard]] ReadTiles tiles_of(const ArchiveReader& archive, int plane = 0);
+/// Decodes a tile, void ones too; called from many threads at once.
+using ReadTile = std::function<TileCodes(TileIndex)>;
+[[nodiscard]] ReadTile tiles_of(const ArchiveReader& archive, int plane = 0);
 
-/// Decodes tiles beside each other on all threads of the caller's oneTBB arena, several together in each where there are
-/// enough, and hands them to use(how far from the first, codes) on the thread that decoded them.
-void for_each_group(const ReadTiles& read_tiles, TileIndex first, std::int64_t tiles,
-                    const std::function<void(std::int64_t, std::span<const TileCodes>)>& use);
+/// Decodes neighbouring tiles on all threads of the caller's oneTBB arena, and hands each to use(how far from the first,
+/// codes) on the thread that decoded it.
+void for_each_tile(const ReadTile& read_tile, TileIndex first, std::int64_t tiles,
+                   const std::function<void(std::int64_t, const TileCodes&)>& use);
 
 /// What Surface does, for tiles that come from anywhere.
 ///
@@ -37,7 +37,7 @@ class PointSampler {
   /// Keeps at most `memory_bytes` of decoded tiles, and has as much again in hand during a call; one tile in each
   /// thread at least.
   /// here  the tiles that there are; nullopt: all
-  PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles, std::uint64_t memory_bytes,
+  PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile, std::uint64_t memory_bytes,
                const std::optional<TileRange>& here = {});
 
   void sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples);
@@ -64,12 +64,11 @@ class PointSampler {
 
   TileGrid grid_;
   Quantisation quantisation_;
-  ReadTiles read_tiles_;
+  ReadTile read_tile_;
   TileRange here_;
-  std::size_t capacity_;        ///< tiles to keep
-  std::size_t tiles_together_;  ///< decoded at once by one thread
-  std::mutex mutex_;            ///< of what follows
-  std::list<Kept> used_;        ///< last used first
+  std::size_t capacity_;  ///< tiles to keep
+  std::mutex mutex_;      ///< of what follows
+  std::list<Kept> used_;  ///< last used first
   std::unordered_map<std::int64_t, std::list<Kept>::iterator> by_tile_;
 };
 

@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/content_hash.h"
@@ -68,7 +67,7 @@ struct TileView {
 
 /// Tiles in each thread that are in hand at once, beside each other, and where memory is short.
 constexpr std::int64_t kTilesPerThread = 32;
-constexpr std::int64_t kLeastTilesPerThread = static_cast<std::int64_t>(kBatchLanes);
+constexpr std::int64_t kLeastTilesPerThread = 8;
 /// Of each vertex of a tile in hand, beside its codes, and in each thread while tiles are decoded (measured).
 constexpr double kHeightBytes = 4.0;
 constexpr double kDecodingBytes = 40.0;
@@ -280,27 +279,10 @@ class Verification {
     const std::size_t before = tiles.size();
     tiles.resize(before + static_cast<std::size_t>(count));
     const std::span<TileState> read = std::span(tiles).subspan(before);
-    const std::size_t groups = (read.size() + kBatchLanes - 1) / kBatchLanes;
-    oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
-      const std::size_t end = std::min((group + 1) * kBatchLanes, read.size());
-      std::vector<TileIndex> indices;
-      for (std::size_t i = group * kBatchLanes; i < end; ++i) {
-        const TileIndex index{first.column + static_cast<std::int64_t>(i), first.row};
-        if (find_entry(index, read[i])) indices.push_back(index);
-      }
-      std::vector<TileCodes> codes;
-      try {
-        codes = archive_.read_tiles(indices);
-      } catch (const Error&) {
-        codes.clear();  // one by one, to tell which
-      }
-      for (std::size_t i = 0; i < indices.size(); ++i) {
-        read_tile(indices[i], codes.empty() ? nullptr : &codes[i],
-                  read[static_cast<std::size_t>(indices[i].column - first.column)]);
-      }
-      for (std::size_t i = group * kBatchLanes; seeds_ && i < end; ++i) {
-        if (read[i].readable) read[i].seeds = seeds_->prepare(read[i].entry.stored ? &read[i].codes : nullptr);
-      }
+    oneapi::tbb::parallel_for(std::size_t{0}, read.size(), [&](std::size_t i) {
+      const TileIndex index{first.column + static_cast<std::int64_t>(i), first.row};
+      if (find_entry(index, read[i])) read_tile(index, read[i]);
+      if (seeds_ && read[i].readable) read[i].seeds = seeds_->prepare(read[i].entry.stored ? &read[i].codes : nullptr);
     });
   }
 
@@ -332,11 +314,10 @@ class Verification {
     return view(tile.heights, tile.readable, tile.entry.stored);
   }
 
-  /// codes: the tile as read already, or nullptr.
-  void read_tile(TileIndex index, TileCodes* codes, TileState& tile) const {
+  void read_tile(TileIndex index, TileState& tile) const {
     const TileEntry& entry = tile.entry;
     try {
-      tile.codes = codes != nullptr ? std::move(*codes) : archive_.read_tile(index);
+      tile.codes = archive_.read_tile(index);
       if (!archive_.zlib_reads(index)) {
         tile.findings.push_back(make(finding::kTileNotDeflate, index,
                                      "zlib does not inflate it to the same payload, or its idle bits are not 0"));

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <bit>
 #include <random>
 #include <vector>
 
@@ -94,75 +93,6 @@ TEST_P(ResidualExpander, RefusesTooFewExtraBits) {
       ASSERT_EQ(streams.expand(0, zigzagged.data()), kNotExpanded) << streams.extra_bytes;
       if (streams.extra_bytes == 0) break;
     }
-  }
-}
-
-/// Symbols and extra bits of these zigzagged residuals of floats, and the slack.
-struct FloatStreams {
-  explicit FloatStreams(std::vector<std::uint32_t> residuals) : zigzagged(std::move(residuals)) {
-    for (const std::uint32_t value : zigzagged) {
-      const unsigned symbol = symbol_of(value);
-      symbols.push_back(static_cast<std::byte>(symbol));
-      for (unsigned bit = 0; bit < extra_bits_of_symbol(symbol); ++bit, ++bits) {
-        if (bits % 8 == 0) extra.push_back(std::byte{0});
-        extra.back() |= static_cast<std::byte>((value >> bit & 1U) << bits % 8);
-      }
-    }
-    extra_bytes = extra.size();
-    extra.resize(extra_bytes + kExpanderSlack);
-  }
-  [[nodiscard]] std::uint64_t expand(std::vector<std::uint32_t>& out) const {
-    out.resize(zigzagged.size());
-    return expand_residuals(symbols, std::span(extra).first(extra_bytes), 0, out.data());
-  }
-  std::vector<std::uint32_t> zigzagged;
-  std::vector<std::byte> symbols;
-  std::vector<std::byte> extra;
-  std::size_t extra_bytes = 0;
-  std::uint64_t bits = 0;
-};
-
-/// Residuals of every octave and both its ends, in no order.
-std::vector<std::uint32_t> residuals_of_all_octaves(std::size_t count) {
-  std::mt19937 random(3);
-  std::vector<std::uint32_t> residuals = {0, ~0U};
-  while (residuals.size() < count) {
-    const auto value = static_cast<std::uint32_t>(random()) >> random() % 32;
-    residuals.push_back(random() % 5 == 0 ? std::bit_floor(value) : value);
-  }
-  residuals.resize(count);
-  return residuals;
-}
-
-TEST(FloatResidualExpander, ReadsResidualsOfFloats) {
-  for (const std::size_t count : {std::size_t{1}, std::size_t{2}, std::size_t{3}, std::size_t{5000}}) {
-    const FloatStreams streams(residuals_of_all_octaves(count));
-    std::vector<std::uint32_t> out;
-    ASSERT_EQ(streams.expand(out), streams.bits);
-    EXPECT_EQ(out, streams.zigzagged);
-  }
-}
-
-TEST(FloatResidualExpander, RefusesSymbolsThatFloatsDoNotHave) {
-  std::vector<std::uint32_t> out;
-  for (std::size_t at = 0; at < 7; ++at) {
-    for (const unsigned symbol : {240U, 255U}) {
-      FloatStreams streams(std::vector<std::uint32_t>(7, 3U));
-      streams.symbols[at] = static_cast<std::byte>(symbol);
-      EXPECT_EQ(streams.expand(out), kNotExpanded);
-    }
-  }
-}
-
-TEST(FloatResidualExpander, RefusesTooFewExtraBitsOfFloats) {
-  FloatStreams streams(residuals_of_all_octaves(60));
-  std::vector<std::uint32_t> out;
-  while (streams.extra_bytes-- > 0) {
-    // The slack alone behind what is left, so that the sanitizers see a read too far.
-    streams.extra.assign(streams.extra.begin(),
-                         streams.extra.begin() + static_cast<std::ptrdiff_t>(streams.extra_bytes + kExpanderSlack));
-    ASSERT_EQ(streams.expand(out), kNotExpanded) << streams.extra_bytes;
-    if (streams.extra_bytes == 0) break;
   }
 }
 

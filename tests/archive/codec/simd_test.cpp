@@ -6,14 +6,12 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
 
 #include "archive/codec/tiles.h"
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/deflate/deflate.h"
 
@@ -59,18 +57,9 @@ TEST_F(Simd, DecodesTilesToTheSameSamples) {
       if (encoded.is_empty) continue;
       std::vector<std::byte> payload(encoded.payload_bytes);
       inflate_exactly(encoded.deflated, payload);
-      const std::vector<std::span<const std::byte>> payloads(kBatchLanes, payload);
-      const auto decode = [&] {
-        std::vector<TileCodes> tiles(kBatchLanes);
-        std::array<bool, kBatchLanes> decoded{};
-        decode_batch(shape, type, payloads, tiles, decoded);
-        tiles.push_back(decode_tile(shape, type, payload));
-        return tiles;
-      };
-      const std::vector<TileCodes> wide = decode();
+      const TileCodes wide = decode_tile(shape, type, payload);
       const PlainTwins plain_twins;
-      const std::vector<TileCodes> plain = decode();
-      for (std::size_t i = 0; i < wide.size(); ++i) EXPECT_TRUE(test::same_samples(wide[i], plain[i]));
+      EXPECT_TRUE(test::same_samples(wide, decode_tile(shape, type, payload)));
     }
   }
 }

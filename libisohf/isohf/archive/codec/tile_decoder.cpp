@@ -10,8 +10,6 @@
 #include "isohf/archive/codec/predict/hex_predictor.h"
 #include "isohf/archive/codec/residuals/bits.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/archive/codec/simd/batch_decoder.h"
-#include "isohf/archive/codec/simd/batch_residuals.h"
 #include "isohf/archive/codec/simd/single_decoder.h"
 #include "isohf/archive/codec/simd/wavefront_decoder.h"
 #include "isohf/archive/codec/tile_payload.h"
@@ -221,19 +219,6 @@ TileCodes decode_checked(const TileShape& shape, CodeType type, std::span<const 
   return tile;
 }
 
-/// False where others have to judge of the payload.
-bool decode_alone(const TileShape& shape, CodeType type, std::span<const std::byte> bytes, TileCodes& tile) {
-  BatchPayload<std::uint16_t> payload;
-  try {
-    if (!payload.open(shape, type, bytes)) return false;
-  } catch (const Error&) {
-    return false;
-  }
-  tile.type = type;
-  tile.codes.resize(static_cast<std::size_t>(shape.stored_vertex_count()));
-  return decode_single(shape, payload, tile);
-}
-
 }  // namespace
 
 TileCodes decode_tile_slowly(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
@@ -246,17 +231,16 @@ TileCodes decode_tile_slowly(const TileShape& shape, CodeType type, std::span<co
 }
 
 TileCodes decode_tile(const TileShape& shape, CodeType type, std::span<const std::byte> payload) {
-  if (type == CodeType::kF32) return decode_tile_slowly(shape, type, payload);  // one lane of eight would take longer
+  if (type == CodeType::kF32 || payload.size() > max_payload_bytes(shape, type))
+    return decode_tile_slowly(shape, type, payload);
   TileCodes tile;
-  if (is_adaptive(payload) && payload.size() <= max_payload_bytes(shape, type)) {
+  if (is_adaptive(payload)) {
     tile.type = type;
     tile.codes.resize(static_cast<std::size_t>(shape.stored_vertex_count()));
     if (decode_wavefront(shape, read_adaptive_payload(shape, type, payload), tile)) return tile;
     return decode_tile_slowly(shape, type, payload);
   }
-  bool is_decoded = decode_alone(shape, type, payload, tile);
-  if (!is_decoded) decode_batch(shape, type, {&payload, 1}, {&tile, 1}, {&is_decoded, 1});
-  return is_decoded ? tile : decode_tile_slowly(shape, type, payload);
+  return decode_single(shape, type, payload, tile) ? tile : decode_tile_slowly(shape, type, payload);
 }
 
 }  // namespace isohf

@@ -10,7 +10,7 @@ namespace isohf {
 /// Measured (docs/performance.md, decision 23): the program with its libraries and its pools of memory that was freed.
 inline constexpr double kProgramBytes = 12.8e6;
 inline constexpr double kThreadBytes = 0.7e6;
-/// In each thread, of each vertex of a tile: several tiles that are decoded side by side.
+/// In each thread, of each vertex of a tile that is decoded.
 inline constexpr double kDecodingBytesPerVertex = 60.0;
 
 /// Gives memory that was freed back to the system, where it would be added to what comes next.

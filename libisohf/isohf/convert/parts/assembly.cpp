@@ -9,7 +9,6 @@
 #include <map>
 #include <utility>
 
-#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/content_hash.h"
@@ -40,6 +39,8 @@ void set_own_range(const TileCodes& codes, const Quantisation& quantisation, Enc
   }
 }
 
+/// Tiles that a thread reads one after the other.
+constexpr std::size_t kTilesTogether = 8;
 /// Tiles of a row whose records are looked at together.
 constexpr std::int64_t kColumnsAtOnce = 4096;
 const std::string kSeedTable = "seeds/{row}/{column}.seed";
@@ -99,7 +100,7 @@ bool Assembly::decodes() const {
 void Assembly::add_tiles() {
   const TileGrid& grid = metadata_.grid;
   const std::int64_t columns = grid.tile_columns();
-  const auto batch = static_cast<std::size_t>(kBatchLanes) * static_cast<std::size_t>(threads_of(job_));
+  const auto batch = kTilesTogether * static_cast<std::size_t>(threads_of(job_));
   Row above;
   for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
     const std::vector<const AssemblyInput*> inputs = inputs_of_row(row);
@@ -190,7 +191,7 @@ void Assembly::close_before(std::int64_t row) {
 void Assembly::add_plane_rows(std::int64_t row) {
   const Planes planes = planes_of(metadata_);
   const TileGrid& grid = planes.grid(1);
-  const auto batch = static_cast<std::int64_t>(kBatchLanes) * threads_of(job_);
+  const auto batch = static_cast<std::int64_t>(kTilesTogether) * threads_of(job_);
   for (; next_plane_row_ < grid.tile_rows(); ++next_plane_row_) {
     const std::int64_t needed = std::min((next_plane_row_ + 1) * planes.stride() + 1, metadata_.grid.tile_rows());
     if (row + 1 < needed) return;
@@ -202,16 +203,16 @@ void Assembly::add_plane_rows(std::int64_t row) {
       const std::vector<PartFile::Stored> tiles = file.stored(tile_table_name(1), next_plane_row_, some);
       // Of a void tile those below are asked.
       const ArchiveReader* const below = tiles.size() == samples.size() ? nullptr : &file.archive();
-      const std::size_t groups = planes.count() > 1 ? (samples.size() + kBatchLanes - 1) / kBatchLanes : 0;
+      const std::size_t groups = planes.count() > 1 ? (samples.size() + kTilesTogether - 1) / kTilesTogether : 0;
       oneapi::tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
         const auto begin = std::partition_point(tiles.begin(), tiles.end(), [&](const PartFile::Stored& tile) {
-          return tile.column < first + static_cast<std::int64_t>(group * kBatchLanes);
+          return tile.column < first + static_cast<std::int64_t>(group * kTilesTogether);
         });
         const auto end = std::partition_point(begin, tiles.end(), [&](const PartFile::Stored& tile) {
-          return tile.column < first + static_cast<std::int64_t>((group + 1) * kBatchLanes);
+          return tile.column < first + static_cast<std::int64_t>((group + 1) * kTilesTogether);
         });
         std::vector<TileCodes> codes = file.decode(metadata_.grid.shape(), metadata_.quantisation.type, {begin, end});
-        for (std::size_t i = group * kBatchLanes; i < std::min(samples.size(), (group + 1) * kBatchLanes); ++i) {
+        for (std::size_t i = group * kTilesTogether; i < std::min(samples.size(), (group + 1) * kTilesTogether); ++i) {
           const TileIndex index{first + static_cast<std::int64_t>(i), next_plane_row_};
           const auto read = [&](int plane, TileIndex tile) {
             PlaneBuilder::Stored stored;
@@ -263,44 +264,46 @@ void Assembly::read(std::span<const AssemblyInput* const> inputs, TileIndex firs
     if (tiles[i].from == nullptr) make_void(index, tiles[i].encoded);
   }
   if (!decodes()) return;
-  oneapi::tbb::parallel_for(std::size_t{0}, (tiles.size() + kBatchLanes - 1) / kBatchLanes, [&](std::size_t group) {
-    const std::size_t begin = group * kBatchLanes;
-    const auto lanes = tiles.subspan(begin, std::min<std::size_t>(kBatchLanes, tiles.size() - begin));
-    const auto index_of = [&](std::size_t i) {
-      return TileIndex{first.column + static_cast<std::int64_t>(begin + i), first.row};
-    };
-    std::map<const ArchiveReader*, std::vector<std::size_t>> stored;
-    for (std::size_t i = 0; i < lanes.size(); ++i) {
-      if (lanes[i].from != nullptr) stored[lanes[i].from].push_back(i);
-    }
-    for (const auto& [archive, places] : stored) {
-      std::vector<TileIndex> indices;
-      for (const std::size_t i : places) indices.push_back(index_of(i));
-      std::vector<TileCodes> codes = archive->read_tiles(indices, request_.plane);
-      for (std::size_t k = 0; k < places.size(); ++k) {
-        Tile& tile = lanes[places[k]];
-        EncodedTile& encoded = tile.encoded;
-        tile.codes = std::move(codes[k]);
-        // Another tool's members may be stored, and their ranges are not known: only what was packed again is coded again.
-        if (archive->reads_by_directory()) {
-          const std::vector<std::byte> digest = std::move(encoded.content_digest);
-          encoded = encode_tile(metadata_.grid.shape(), tile.codes, metadata_.level.value_or(kDefaultLevel));
-          if (!digest.empty()) encoded.content_digest = digest;
+  oneapi::tbb::parallel_for(
+      std::size_t{0}, (tiles.size() + kTilesTogether - 1) / kTilesTogether, [&](std::size_t group) {
+        const std::size_t begin = group * kTilesTogether;
+        const auto lanes = tiles.subspan(begin, std::min(kTilesTogether, tiles.size() - begin));
+        const auto index_of = [&](std::size_t i) {
+          return TileIndex{first.column + static_cast<std::int64_t>(begin + i), first.row};
+        };
+        std::map<const ArchiveReader*, std::vector<std::size_t>> stored;
+        for (std::size_t i = 0; i < lanes.size(); ++i) {
+          if (lanes[i].from != nullptr) stored[lanes[i].from].push_back(i);
         }
-        if (request_.checks_digests || encoded.content_digest.empty()) {
-          std::vector<std::byte> digest = tile_content_digest(tile.codes);
-          if (!encoded.content_digest.empty() && digest != encoded.content_digest) {
-            throw Error(ErrorCode::kCorrupt, fmt::format("{}: tile ({},{}) differs from its digest; see isohf verify",
-                                                         archive->path(), indices[k].column, indices[k].row));
+        for (const auto& [archive, places] : stored) {
+          std::vector<TileIndex> indices;
+          for (const std::size_t i : places) indices.push_back(index_of(i));
+          for (std::size_t k = 0; k < places.size(); ++k) {
+            Tile& tile = lanes[places[k]];
+            EncodedTile& encoded = tile.encoded;
+            tile.codes = archive->read_tile(indices[k], request_.plane);
+            // Another tool's members may be stored, and their ranges are not known: only what was packed again is coded again.
+            if (archive->reads_by_directory()) {
+              const std::vector<std::byte> digest = std::move(encoded.content_digest);
+              encoded = encode_tile(metadata_.grid.shape(), tile.codes, metadata_.level.value_or(kDefaultLevel));
+              if (!digest.empty()) encoded.content_digest = digest;
+            }
+            if (request_.checks_digests || encoded.content_digest.empty()) {
+              std::vector<std::byte> digest = tile_content_digest(tile.codes);
+              if (!encoded.content_digest.empty() && digest != encoded.content_digest) {
+                throw Error(ErrorCode::kCorrupt,
+                            fmt::format("{}: tile ({},{}) differs from its digest; see isohf verify", archive->path(),
+                                        indices[k].column, indices[k].row));
+              }
+              encoded.content_digest = std::move(digest);
+            }
+            if (request_.plane != 0) set_own_range(tile.codes, metadata_.quantisation, encoded);
+            if (counted_)
+              encoded.statistics = tile_statistics(*counted_, indices[k], tile.codes, metadata_.quantisation);
+            if (request_.planes != nullptr) tile.sample = request_.planes->sample(tile.codes, encoded);
           }
-          encoded.content_digest = std::move(digest);
         }
-        if (request_.plane != 0) set_own_range(tile.codes, metadata_.quantisation, encoded);
-        if (counted_) encoded.statistics = tile_statistics(*counted_, indices[k], tile.codes, metadata_.quantisation);
-        if (request_.planes != nullptr) tile.sample = request_.planes->sample(tile.codes, encoded);
-      }
-    }
-  });
+      });
 }
 
 void Assembly::make_void(TileIndex index, EncodedTile& tile) const {

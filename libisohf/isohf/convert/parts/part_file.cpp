@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 
-#include "isohf/archive/codec/simd/batch_decoder.h"
 #include "isohf/archive/codec/tile_decoder.h"
 #include "isohf/archive/codec/tile_payload.h"
 #include "isohf/archive/container/archive_directory.h"
@@ -75,23 +73,12 @@ std::vector<TileCodes> PartFile::decode(const TileShape& shape, CodeType type, s
     if (crc32(payload) != entry.payload_crc32) throw Error(ErrorCode::kCorrupt, "has another CRC-32 than is stated");
     return payload;
   };
-  std::vector<TileCodes> codes(tiles.size());
-  for (std::size_t begin = 0; begin < tiles.size(); begin += kBatchLanes) {
-    const std::size_t lanes = std::min<std::size_t>(kBatchLanes, tiles.size() - begin);
-    std::array<std::vector<std::byte>, kBatchLanes> payloads;
-    std::array<std::span<const std::byte>, kBatchLanes> spans;
-    std::array<bool, kBatchLanes> is_decoded{};
-    std::size_t lane = 0;
+  std::vector<TileCodes> codes;
+  for (const Stored& tile : tiles) {
     try {
-      for (; lane < lanes; ++lane) spans[lane] = payloads[lane] = payload_of(tiles[begin + lane].record.entry);
-      decode_batch(shape, type, std::span(spans).first(lanes), std::span(codes).subspan(begin, lanes),
-                   std::span(is_decoded).first(lanes));
-      for (lane = 0; lane < lanes; ++lane) {
-        if (!is_decoded[lane]) codes[begin + lane] = decode_tile(shape, type, spans[lane]);
-      }
+      codes.push_back(decode_tile(shape, type, payload_of(tile.record.entry)));
     } catch (const Error& error) {
-      throw error.within(
-          fmt::format("{}: tile at byte {}", source_.name, tiles[begin + lane].record.entry.offset_bytes));
+      throw error.within(fmt::format("{}: tile at byte {}", source_.name, tile.record.entry.offset_bytes));
     }
   }
   return codes;

@@ -106,7 +106,7 @@ ResidualStage::ResidualStage(HeightSource& source, const SourceFrame& frame, con
     nodes_ = places.bytes();
   }
   surface_.emplace(
-      grid, frame.wraps_x, quantisation, [this](std::span<const TileIndex> tiles) { return read_tiles_(tiles); },
+      grid, frame.wraps_x, quantisation, [this](TileIndex tile) { return read_tile_(tile); },
       SampleGrid{frame.width, frame.height, frame.first_sample_x, frame.first_sample_z, frame.spacing_x,
                  frame.spacing_z},
       record_, [this] { return nodes_; }, scratch);
@@ -117,12 +117,12 @@ RowRange ResidualStage::tile_rows_needed() const {
   return surface_->tile_rows_needed(rows_.first, rows_.last - rows_.first + 1);
 }
 
-LosslessRecord ResidualStage::write(const ReadTiles& read_tiles, std::size_t members_at_once,
+LosslessRecord ResidualStage::write(const ReadTile& read_tile, std::size_t members_at_once,
                                     const std::optional<std::string>& sha256, ArchiveWriter& writer, const Job& job) {
   const SourceInfo& info = source_.info();
   const std::int64_t end = rows_.last + 1;
   LosslessRecord record = record_;
-  read_tiles_ = read_tiles;
+  read_tile_ = read_tile;
   if (!nodes_.empty() && rows_.first == 0) writer.add_member(kNodesName, nodes_, true);
   Sha256 hash;
   for (std::int64_t row = rows_.first; row < end;) {

@@ -32,11 +32,11 @@ class ResidualStage {
   /// The rows of tiles that the predictions read.
   [[nodiscard]] RowRange tile_rows_needed() const;
 
-  /// Writes the members by tiles that read_tiles gives. Reads the source from North to South; memory is bounded by two
+  /// Writes the members by tiles that read_tile gives. Reads the source from North to South; memory is bounded by two
   /// rows of tiles and a few bands of source rows. The bytes depend neither on the arena nor on `members_at_once`. Stage
   /// "residuals".
   ///   sha256  of all samples, where it is known; else they are all read here
-  [[nodiscard]] LosslessRecord write(const ReadTiles& read_tiles, std::size_t members_at_once,
+  [[nodiscard]] LosslessRecord write(const ReadTile& read_tile, std::size_t members_at_once,
                                      const std::optional<std::string>& sha256, ArchiveWriter& writer, const Job& job);
 
  private:
@@ -44,7 +44,7 @@ class ResidualStage {
   LosslessRecord record_;
   std::vector<std::byte> nodes_;
   RowRange rows_;  ///< of the source
-  ReadTiles read_tiles_;
+  ReadTile read_tile_;
   std::optional<SamplePredictor> surface_;
 };
 

@@ -123,14 +123,14 @@ struct SplinePredictor::Block {
 };
 
 SplinePredictor::SplinePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation,
-                                 int fraction_bits, ReadTiles read_tiles, const SampleGrid& samples,
+                                 int fraction_bits, ReadTile read_tile, const SampleGrid& samples,
                                  const ScratchFolder& scratch)
     : grid_(grid),
       wraps_x_(wraps_x),
       numbers_(quantisation, fraction_bits),
       samples_(samples),
       taps_{{static_cast<std::size_t>(samples.width), scratch}, {6 * static_cast<std::size_t>(samples.width), scratch}},
-      tiles_(grid, quantisation, std::move(read_tiles), 0, grid.tile_columns() - 1, scratch),
+      tiles_(grid, quantisation, std::move(read_tile), 0, grid.tile_columns() - 1, scratch),
       in_scratch_(scratch.has_value()),
       heights_(static_cast<std::size_t>(samples.width), scratch),
       coefficients_(static_cast<std::size_t>(samples.width), scratch),

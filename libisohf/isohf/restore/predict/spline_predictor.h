@@ -28,7 +28,7 @@ class SplinePredictor {
   /// wraps_x  the grid's East edge is its West edge
   /// scratch  keeps tile rows and lattice rows where memory has no room for them
   SplinePredictor(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, int fraction_bits,
-                  ReadTiles read_tiles, const SampleGrid& samples, const ScratchFolder& scratch = {});
+                  ReadTile read_tile, const SampleGrid& samples, const ScratchFolder& scratch = {});
 
   /// Estimates: of what is held for the columns; of tiles and lattice rows, where those in hand span so many lattice
   /// rows; of making lattice rows.

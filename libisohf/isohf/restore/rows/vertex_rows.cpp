@@ -16,11 +16,11 @@ using FloatRows = KeptRows<float>;
 
 }  // namespace
 
-VertexRows::VertexRows(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles, std::int64_t first,
+VertexRows::VertexRows(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile, std::int64_t first,
                        std::int64_t last, const ScratchFolder& scratch)
     : grid_(grid),
       quantisation_(quantisation),
-      read_tiles_(std::move(read_tiles)),
+      read_tile_(std::move(read_tile)),
       first_(first),
       last_(last),
       rows_(CodeRows(0, scratch)) {
@@ -44,26 +44,16 @@ void VertexRows::decode(std::int64_t tile_row, Rows& rows, const Values& values_
   const auto columns = static_cast<std::size_t>(grid_.shape().columns());
   for (int row = 0; row < height; ++row) rows.add(number(tile_row, row));
   std::atomic<bool> any = false;
-  for_each_group(read_tiles_, {first_, tile_row}, last_ - first_ + 1, [&](std::int64_t from, const auto& decoded) {
-    auto line = values_of(decoded.front());  // of its type
-    line.resize(decoded.size() * columns);
-    for (int row = 0; row < height; ++row) {
-      for (std::size_t i = 0; i < decoded.size(); ++i) {
-        const auto& values = values_of(decoded[i]);
-        std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(row) * columns), columns,
-                    line.begin() + static_cast<std::ptrdiff_t>(i * columns));
-      }
-      rows.write(number(tile_row, row), static_cast<std::size_t>(from) * columns, line);
-    }
+  for_each_tile(read_tile_, {first_, tile_row}, last_ - first_ + 1, [&](std::int64_t from, const TileCodes& tile) {
+    const auto& values = values_of(tile);
+    for (int row = 0; row < height; ++row)
+      rows.write(number(tile_row, row), static_cast<std::size_t>(from) * columns,
+                 std::span(values).subspan(static_cast<std::size_t>(row) * columns, columns));
     const auto is_void = [&](auto value) {
       return quantisation_.type == CodeType::kF32 ? std::isnan(static_cast<float>(value))
                                                   : static_cast<std::uint32_t>(value) == quantisation_.void_code();
     };
-    for (const TileCodes& tile : decoded) {
-      if (any.load(std::memory_order_relaxed)) break;
-      const auto& values = values_of(tile);
-      if (std::any_of(values.begin(), values.end(), is_void)) any = true;
-    }
+    if (!any.load(std::memory_order_relaxed) && std::any_of(values.begin(), values.end(), is_void)) any = true;
   });
   has_voids = any;
 }

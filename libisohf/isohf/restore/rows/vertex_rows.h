@@ -13,7 +13,7 @@ namespace isohf {
 class VertexRows {
  public:
   /// first, last  columns of tiles
-  VertexRows(const TileGrid& grid, const Quantisation& quantisation, ReadTiles read_tiles, std::int64_t first,
+  VertexRows(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile, std::int64_t first,
              std::int64_t last, const ScratchFolder& scratch);
 
   /// In memory, of the rows of tiles that so many lattice rows lie on; an estimate, of whole rows of tiles.
@@ -45,7 +45,7 @@ class VertexRows {
 
   TileGrid grid_;
   Quantisation quantisation_;
-  ReadTiles read_tiles_;
+  ReadTile read_tile_;
   std::int64_t first_;
   std::int64_t last_;
   std::deque<TileRow> tile_rows_;  ///< from North to South

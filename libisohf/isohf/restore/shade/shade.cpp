@@ -1,5 +1,6 @@
 #include "isohf/shade.h"
 
+#include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
@@ -315,7 +316,7 @@ class ShadeRenderer {
                    ? 0
                    : planes_of(archive.metadata())
                          .plane_for_spacing(x_.pixel() / kVerticesPerPixel, z_.pixel() / kVerticesPerPixel)),
-        read_tiles_(tiles_of(archive, plane_)),
+        read_tile_(tiles_of(archive, plane_)),
         size_(size),
         width_(static_cast<std::size_t>(size.first)),
         grid_(archive.metadata().plane_grid(plane_)),
@@ -439,19 +440,15 @@ class ShadeRenderer {
     has_voids_ = false;
     const auto columns = static_cast<std::size_t>(grid_.shape().columns());
     const TileIndex begin{0, tile_row};
-    for_each_group(
-        read_tiles_, begin, grid_.tile_columns(), [&](std::int64_t first, std::span<const TileCodes> decoded) {
-          std::vector<float> line(decoded.size() * columns);
-          bool has_voids = false;
-          for (int row = 0; row < grid_.shape().rows(); ++row) {
-            for (std::size_t i = 0; i < decoded.size(); ++i) {
-              const std::span out = std::span(line).subspan(i * columns, columns);
-              has_voids = heights_of_row(decoded[i], static_cast<std::size_t>(row) * columns, out) || has_voids;
-            }
-            heights_->write_row(row, first, line);
-          }
-          if (has_voids) has_voids_ = true;
-        });
+    for_each_tile(read_tile_, begin, grid_.tile_columns(), [&](std::int64_t tile, const TileCodes& decoded) {
+      std::vector<float> line(columns);
+      bool has_voids = false;
+      for (int row = 0; row < grid_.shape().rows(); ++row) {
+        has_voids = heights_of_row(decoded, static_cast<std::size_t>(row) * columns, line) || has_voids;
+        heights_->write_row(row, tile, line);
+      }
+      if (has_voids) has_voids_ = true;
+    });
   }
 
   /// Heights of codes from the one numbered `first` on; returns whether one is void.
@@ -824,7 +821,7 @@ class ShadeRenderer {
   PixelAxis x_;
   PixelAxis z_;
   int plane_;  ///< the coarsest with vertices enough
-  ReadTiles read_tiles_;
+  ReadTile read_tile_;
   GridSize size_;
   std::size_t width_;
   TileGrid grid_;

@@ -27,8 +27,6 @@ def measure(bench):
     rows = []
     for name, run in found.items():
         shown = name.replace("/", " ") if not labels[name] else f"{name.split('/')[0]}, {labels[name]}"
-        if name.startswith("decode, tiles side by side/"):
-            shown = f"decode, {name.split('/')[1]} side by side, version 1, {labels[name]}"
         rows.append([shown, f"{run['gb_s']:.2f}", f"{run['ns']:.2f}",
                      *(f"{run['gb_s'] / found[base]['gb_s']:.3g}" for base in BASES)])
     bench.add("kernels", ["kernel", "GB/s", "ns a sample", "× memcpy", "× libdeflate 6", "× libdeflate's inflate"], rows,

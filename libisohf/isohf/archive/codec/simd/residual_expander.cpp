@@ -94,49 +94,6 @@ ISOHF_TARGET_WIDE std::uint64_t expand_widely(const std::byte* symbols, std::siz
 }
 #endif
 
-/// The same for floats: the smallest residual alone may take 32 bits.
-struct FloatSymbol {
-  std::uint32_t least;
-  std::uint32_t extra_bits;
-};
-constexpr unsigned kFloatSymbols = symbol_limit(32);
-constexpr std::array<FloatSymbol, 256> make_float_symbols() {
-  std::array<FloatSymbol, 256> table{};
-  for (unsigned symbol = 0; symbol < kFloatSymbols; ++symbol) {
-    table[symbol] = {zigzagged_from(symbol, 0), extra_bits_of_symbol(symbol)};
-  }
-  return table;
-}
-constexpr auto kFloatSymbolTable = make_float_symbols();
-static_assert(7 + 2 * extra_bits_of_symbol(kFloatSymbols - 1) <= 64);  // two symbols' extra bits with one read
-
-ISOHF_KERNEL std::uint64_t expand_floats(const std::byte* symbols, std::size_t count, const std::byte* extra,
-                                         std::uint64_t position, std::uint64_t end,
-                                         std::uint32_t* __restrict zigzagged) {
-  unsigned most = 0;
-  const auto put = [&](std::size_t i, std::uint64_t bits) {
-    const auto symbol = std::to_integer<unsigned>(symbols[i]);
-    const FloatSymbol& entry = kFloatSymbolTable[symbol];
-    most = symbol > most ? symbol : most;
-    zigzagged[i] = entry.least + static_cast<std::uint32_t>(bits & ((std::uint64_t{1} << entry.extra_bits) - 1));
-    return entry.extra_bits;
-  };
-  std::size_t i = 0;
-  for (; i + 2 <= count; i += 2) {
-    if (position > end) return kNotExpanded;
-    const std::uint64_t bits = load_little<std::uint64_t>(extra + position / 8) >> position % 8;
-    const unsigned first = put(i, bits);
-    const unsigned second = put(i + 1, bits >> first);
-    position += first + second;
-  }
-  if (position > end) return kNotExpanded;
-  if (i < count) {
-    const auto bits = load_little<std::uint64_t>(extra + position / 8);
-    position += put(i, bits >> (position % 8));
-  }
-  return position > end || most >= kFloatSymbols ? kNotExpanded : position;
-}
-
 }  // namespace
 
 std::uint64_t expand_residuals(std::span<const std::byte> symbols, std::span<const std::byte> extra,
@@ -148,12 +105,6 @@ std::uint64_t expand_residuals(std::span<const std::byte> symbols, std::span<con
   }
 #endif
   return expand_plainly(symbols.data(), symbols.size(), extra.data(), position, end, zigzagged);
-}
-
-std::uint64_t expand_residuals(std::span<const std::byte> symbols, std::span<const std::byte> extra,
-                               std::uint64_t position, std::uint32_t* zigzagged) {
-  return vectorised<expand_floats>(symbols.data(), symbols.size(), extra.data(), position,
-                                   8 * std::uint64_t{extra.size()}, zigzagged);
 }
 
 }  // namespace isohf

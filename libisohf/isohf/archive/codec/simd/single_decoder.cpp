@@ -2,18 +2,70 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "isohf/archive/codec/predict/context_energy.h"
 #include "isohf/archive/codec/residuals/residual_symbols.h"
+#include "isohf/archive/codec/simd/residual_expander.h"
 #include "isohf/archive/codec/simd/slanted_rows.h"
+#include "isohf/archive/codec/tile_payload.h"
 #include "isohf/base/bytes.h"
 #include "isohf/base/simd.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {
 
 constexpr std::ptrdiff_t kLanes = SlantedRows::kLanes;
+
+/// A tile's payload, its residuals put together.
+struct Payload {
+  PayloadHeader header;
+  std::vector<std::uint8_t> is_void;                            ///< in row order; empty where nothing is void
+  std::unique_ptr<std::uint16_t[]> zigzagged;                   ///< context by context, and a row's worth of zeros
+  std::array<const std::uint16_t*, kMaxContexts + 1> starts{};  ///< of the contexts; all past the last one end there
+
+  /// False where the payload is not for this decoder. Throws Error where it is broken.
+  [[nodiscard]] bool open(const TileShape& shape, CodeType type, std::span<const std::byte> bytes) {
+    ByteReader reader(bytes);
+    header = read_payload_header(shape, type, reader);
+    if (header.is_constant) return false;
+    const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
+    std::size_t voids = 0;
+    if (header.has_voids) {
+      is_void = unpack_void_mask(reader.read_bytes(header.mask_bytes), samples);
+      for (const std::uint8_t value : is_void) voids += value;
+    }
+    const SymbolStreams symbols(header, reader);
+    const auto extra = reader.read_bytes(header.extra_bytes);
+    std::size_t count = 0;
+    for (const std::uint32_t of_context : header.symbol_counts) count += of_context;
+    return reader.remaining() == 0 && count == samples - voids && expand(shape.columns(), symbols, extra, count);
+  }
+
+ private:
+  [[nodiscard]] bool expand(int columns, const SymbolStreams& symbols, std::span<const std::byte> extra,
+                            std::size_t count) {
+    std::vector<std::byte> padded(extra.size() + kExpanderSlack);
+    std::copy(extra.begin(), extra.end(), padded.begin());
+    // A row may run past a context's last residual, and past the last of all; that is told when it is done.
+    const auto spare = static_cast<std::size_t>(columns) + 2;
+    zigzagged = std::make_unique_for_overwrite<std::uint16_t[]>(count + spare);
+    std::fill_n(zigzagged.get() + count, spare, std::uint16_t{0});
+    std::uint16_t* to = zigzagged.get();
+    std::uint64_t position = 0;
+    for (std::size_t i = 0; i < header.symbol_counts.size(); ++i) {
+      position = expand_residuals(symbols[i], std::span(padded).first(extra.size()), position, to);
+      if (position == kNotExpanded) return false;
+      starts[i] = to;
+      to += symbols[i].size();
+    }
+    std::fill(starts.begin() + static_cast<std::ptrdiff_t>(header.symbol_counts.size()), starts.end(), to);
+    if ((position + 7) / 8 != extra.size()) return false;
+    return position % 8 == 0 || (std::to_integer<unsigned>(extra[position / 8]) >> (position % 8)) == 0;
+  }
+};
 
 ISOHF_KERNEL void find_magnitudes(const std::uint16_t* zigzagged, int begin, int end, unsigned shift,
                                   std::uint8_t* __restrict magnitudes) {
@@ -23,7 +75,7 @@ ISOHF_KERNEL void find_magnitudes(const std::uint16_t* zigzagged, int begin, int
 /// The residuals of a tile, row by row: what a row's are follows from those of the rows above, not from samples.
 class Residuals {
  public:
-  Residuals(int columns, const BatchPayload<std::uint16_t>& payload)
+  Residuals(int columns, const Payload& payload)
       : columns_(columns),
         payload_(payload),
         table_(context_table(payload.header.thresholds)),
@@ -67,7 +119,7 @@ class Residuals {
   std::uint16_t take(std::uint16_t energy) { return *next_[table_[energy]]++; }
 
   int columns_;
-  const BatchPayload<std::uint16_t>& payload_;
+  const Payload& payload_;
   std::array<std::uint8_t, kEnergyLimit> table_;
   std::array<const std::uint16_t*, kMaxContexts> next_{};
   MagnitudeRows magnitudes_;
@@ -89,7 +141,7 @@ struct Band : SlantedBand {
   const std::uint16_t* zigzagged;  ///< of all lanes, time by time
 };
 
-/// As restore_places of a batch has it.
+/// Predictions completed by residuals. Sums modulo 2^32, as the plain decoder has them.
 template <bool kIsWide>
 ISOHF_KERNEL void restore_time(const Band& band, SlantedRows::Time* now, int t, Ints active, bool is_full,
                                Recent& recent) {
@@ -103,6 +155,7 @@ ISOHF_KERNEL void restore_time(const Band& band, SlantedRows::Time* now, int t, 
   sum += multiply_pairs<kIsWide>(by.weights[kSlantedTerms.size() - 2], (Words)recent.north);
   const Words zigzagged = from_shorts<kIsWide>(band.zigzagged + t * kLanes);
   const Ints residual = (Ints)((zigzagged >> 1U) ^ -(zigzagged & 1U));
+  // Shifted samples are predicted as samples are: 2^27 more in the sum are 2^16 more in the halves, an even number.
   Ints halves = (Ints)(sum + multiply_pairs<kIsWide>(by.weights[kSlantedTerms.size() - 1], (Words)recent.own)) >>
                 (kWeightBits - 1);
   halves = halves < by.least ? by.least : halves;
@@ -135,9 +188,7 @@ ISOHF_KERNEL bool restore_band(const Band& band) {
   return recent.is_within<kIsWide>(band.constants.low, band.constants.high);
 }
 
-}  // namespace
-
-bool decode_single(const TileShape& shape, const BatchPayload<std::uint16_t>& payload, TileCodes& tile) {
+bool decode(const TileShape& shape, const Payload& payload, TileCodes& tile) {
   if constexpr (kSwapsBytes) return false;  // lanes lie in vectors of both 16 and 32 bits
   const PayloadHeader& header = payload.header;
   if (!header.predictors.map.empty()) return false;
@@ -186,6 +237,20 @@ bool decode_single(const TileShape& shape, const BatchPayload<std::uint16_t>& pa
     slanted.next_band(columns);
   }
   return true;
+}
+
+}  // namespace
+
+bool decode_single(const TileShape& shape, CodeType type, std::span<const std::byte> bytes, TileCodes& tile) {
+  Payload payload;
+  try {
+    if (!payload.open(shape, type, bytes)) return false;
+  } catch (const Error&) {
+    return false;
+  }
+  tile.type = type;
+  tile.codes.resize(static_cast<std::size_t>(shape.stored_vertex_count()));
+  return decode(shape, payload, tile);
 }
 
 }  // namespace isohf
