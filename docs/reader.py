@@ -117,13 +117,12 @@ def decode(payload, columns, rows, kind):
         require(len(payload) >= 30, "a payload ends early")
         base, extra_bytes, shift, contexts, paired, predictors, n = struct.unpack_from("<iIBBHBB", payload, 16)
         require(low <= base <= high and shift < 32 and 1 <= contexts <= 16 and paired >> contexts == 0
-                and 1 <= predictors <= 8 and n in (12, 18), "a header's fields")
-        fields = "<%dh%dH%dI" % (n * predictors, contexts - 1, contexts)
+                and predictors == 1 and n in (12, 18), "a header's fields")
+        fields = "<%dh%dH%dI" % (n, contexts - 1, contexts)
         require(len(payload) >= 30 + struct.calcsize(fields), "a payload ends early")
         numbers = struct.unpack_from(fields, payload, 30)
-        weights = [numbers[n * p : n * p + n] for p in range(predictors)]
-        thresholds, counts = numbers[n * predictors : -contexts], numbers[-contexts:]
-        require(all(sum(map(abs, w)) < 28672 for w in weights), "weights that are too large")
+        weights, thresholds, counts = numbers[:n], numbers[n:-contexts], numbers[-contexts:]
+        require(sum(map(abs, weights)) < 28672, "weights that are too large")
         require(all(a < b for a, b in zip((0,) + thresholds, thresholds + (4096,))), "thresholds out of order")
         at = 30 + struct.calcsize(fields)
     mask = void_mask(payload[at : at + mask_bytes], columns * rows) if flags & 1 else [0] * (columns * rows)
@@ -131,11 +130,6 @@ def decode(payload, columns, rows, kind):
     if flags & 2:
         require(at == len(payload), "bytes behind the payload's end")
         return [None if void else low for void in mask], dropped
-    across = -(-columns // 16)
-    blocks = across * -(-rows // 16) if predictors > 1 else 0
-    block_map = payload[at : at + blocks]
-    require(len(block_map) == blocks and all(p < predictors for p in block_map), "the map of predictors")
-    at += blocks
     symbols = []
     for k, count in enumerate(counts):
         found, at = symbols_of(payload, at, count, paired >> k & 1)
@@ -176,7 +170,7 @@ def decode(payload, columns, rows, kind):
             if mask[r * columns + column[p]]:
                 v[p], g[p] = (v[p - 1] + ne) >> 1, 0
                 continue
-            w = FIXED.get(r) or weights[block_map[r // 16 * across + p // 16] if blocks else 0]
+            w = FIXED.get(r) or weights
             total = sum(a * (b - ne) for a, b in zip(w, neighbours_of(v, near, far, farther, p, s)))
             halves = min(max((4096 * ne + total) >> 11, 2 * low), 2 * high - 1)
             folded = residual(energy_above(n, f, p, s))

@@ -87,12 +87,11 @@ def describe(data):
     assert json_end == directory
     fields = [("B", "version of the codec"), ("B", "sample type: u16"), ("B", "flags"), ("B", "dropped bits"),
               ("i", "low"), ("i", "high"), ("I", "size of the void mask"), ("i", "base"), ("I", "size of the extra bits"),
-              ("B", "context energy shift a"), ("B", "contexts K"), ("H", "contexts in pairs"), ("B", "predictors P"),
-              ("B", "weights T of each")]
+              ("B", "context energy shift a"), ("B", "contexts K"), ("H", "contexts in pairs"), ("B", "always 1"), ("B", "weights T")]
     payload_text, values, at = table(payload, 0, fields)
-    extra_bytes, contexts, predictors, weights = values[8], values[10], values[12], values[13]
-    shown = struct.unpack_from(f"<{predictors * weights}h", payload, at)
-    at += 2 * predictors * weights
+    extra_bytes, contexts, weights = values[8], values[10], values[13]
+    shown = struct.unpack_from(f"<{weights}h", payload, at)
+    at += 2 * weights
     thresholds = struct.unpack_from(f"<{contexts - 1}H", payload, at)
     at += 2 * (contexts - 1)
     counts = struct.unpack_from(f"<{contexts}I", payload, at)

@@ -32,7 +32,6 @@ std::optional<std::vector<std::byte>> digest_by(Decode decode, const isohf::Tile
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using isohf::CodeType;
   if (size == 0) return 0;
-  // The last one is large enough for several blocks of predictors.
   static const isohf::TileShape shapes[] = {isohf::TileShape::make(5, 5, 1), isohf::TileShape::make(12, 11, 3),
                                             isohf::TileShape::make(68, 67, 1)};
   const CodeType types[] = {CodeType::kU16, CodeType::kU8, CodeType::kF32};

@@ -67,39 +67,6 @@ TileCodes make_tile(const TileShape& shape, CodeType type, Kind kind, std::uint3
   return tile;
 }
 
-TileCodes make_halves(const TileShape& shape, CodeType type) {
-  std::mt19937 random(1);
-  TileCodes tile;
-  tile.type = type;
-  for (int r = 0; r < shape.rows(); ++r) {
-    for (int c = 0; c < shape.columns(); ++c) {
-      const double noise = static_cast<double>(random() % 160) - 80.0;
-      const double value = 120.0 + (c < shape.columns() / 2 ? noise : 90.0 * std::sin(0.2 * c + 0.3 * r));
-      if (type == CodeType::kF32) {
-        tile.heights.push_back(static_cast<float>(value));
-      } else {
-        tile.codes.push_back(static_cast<std::uint16_t>(value));
-      }
-    }
-  }
-  return tile;
-}
-
-Predictors make_predictors(const TileShape& shape, std::size_t count, bool is_wide) {
-  Predictors predictors;
-  predictors.is_wide = is_wide;
-  predictors.weights.resize(count, kThirdRowWeights);
-  for (std::size_t i = 0; i < count; ++i) {
-    predictors.weights[i][2] = static_cast<std::int16_t>(100 * i);
-    if (is_wide) predictors.weights[i][17] = static_cast<std::int16_t>(300 - 90 * static_cast<int>(i));
-  }
-  if (count == 1) return predictors;
-  predictors.block_columns = Predictors::blocks_across(shape.columns());
-  predictors.map.resize(block_count(shape));
-  for (std::size_t i = 0; i < predictors.map.size(); ++i) predictors.map[i] = static_cast<std::uint8_t>(i * i % count);
-  return predictors;
-}
-
 bool same_samples(const TileCodes& a, const TileCodes& b) {
   if (a.type != b.type || a.codes != b.codes || a.heights.size() != b.heights.size()) return false;
   for (std::size_t i = 0; i < a.heights.size(); ++i) {

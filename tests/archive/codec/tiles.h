@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/codec/predict/predictors.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/metadata.h"
 
@@ -22,11 +21,6 @@ inline constexpr Kind kAllKinds[] = {Kind::kConstant,   Kind::kPlane,     Kind::
 
 /// A tile of that kind; the same arguments give the same tile.
 [[nodiscard]] TileCodes make_tile(const TileShape& shape, CodeType type, Kind kind, std::uint32_t seed);
-
-/// Codes or floats that want a predictor of their own in each half: noise in the West, waves in the East.
-[[nodiscard]] TileCodes make_halves(const TileShape& shape, CodeType type);
-/// Several predictors and a map that takes them in turn, or one.
-[[nodiscard]] Predictors make_predictors(const TileShape& shape, std::size_t count, bool is_wide);
 
 /// NaN equals NaN; otherwise bits decide.
 [[nodiscard]] bool same_samples(const TileCodes& a, const TileCodes& b);

@@ -140,22 +140,21 @@ class TileDecoder {
     const Wide* const north = lattice_.row(r - 1) + r % 2;
     std::uint8_t* const magnitudes = magnitudes_.current();
     bool in_range = true;
-    header_.predictors.for_stretches(r, first, last, [&](const PredictorWeights& weights, int begin, int end) {
-      const Wide weight_w = weights[0], weight_ww = weights[2];
-      for (int place = begin; place < end; ++place) {
-        if (kWithVoids && void_row[column_of_place(lattice_.columns(), r, place)] != 0) {
-          own[place] = void_fill(own, north, place);
-          magnitudes[place] = 0;
-          continue;
-        }
-        const auto at = static_cast<std::size_t>(place);
-        const std::uint32_t residual = residuals_.take(energies_[at]);
-        magnitudes[place] = magnitude(residual, header_.energy_shift);
-        const Wide halves = complete(parts_[at], weight_w, own[place - 1], weight_ww, own[place - 2]);
-        own[place] = restore(std::min(std::max(halves, least), most), residual);
-        in_range &= own[place] >= header_.low && own[place] <= header_.high;
+    const PredictorWeights& weights = header_.predictors.of_row(r);
+    const Wide weight_w = weights[0], weight_ww = weights[2];
+    for (int place = first; place <= last; ++place) {
+      if (kWithVoids && void_row[column_of_place(lattice_.columns(), r, place)] != 0) {
+        own[place] = void_fill(own, north, place);
+        magnitudes[place] = 0;
+        continue;
       }
-    });
+      const auto at = static_cast<std::size_t>(place);
+      const std::uint32_t residual = residuals_.take(energies_[at]);
+      magnitudes[place] = magnitude(residual, header_.energy_shift);
+      const Wide halves = complete(parts_[at], weight_w, own[place - 1], weight_ww, own[place - 2]);
+      own[place] = restore(std::min(std::max(halves, least), most), residual);
+      in_range &= own[place] >= header_.low && own[place] <= header_.high;
+    }
     return in_range;
   }
 
@@ -204,7 +203,6 @@ TileCodes decode_checked(const TileShape& shape, CodeType type, std::span<const 
   const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
   std::vector<std::uint8_t> is_void;
   if (header.has_voids) is_void = unpack_void_mask(reader.read_bytes(header.mask_bytes), samples);
-  if (!header.is_constant) read_block_map(shape, reader, header.predictors);
   TileCodes tile = void_tile(shape, {type, 0.0, 1.0});
   if (type == CodeType::kF32) {
     decode_samples<std::int64_t>(shape, header, is_void, reader, [&](std::size_t i, std::int64_t ordered) {

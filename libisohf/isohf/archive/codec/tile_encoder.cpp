@@ -23,7 +23,6 @@
 namespace isohf {
 namespace {
 
-/// One predictor each: a second one by blocks took more bytes than it saved (decision 44).
 //      passes thinning wide     thinning pairs
 constexpr std::array<CodingEffort, kMaxLevel> kEfforts = {{
     {.fit = {0, 1, false}, .streams = {15, false}},
@@ -177,7 +176,6 @@ Deflated deflate_parts(std::span<const std::span<const std::byte>> parts) {
 struct Request {
   int level;
   PayloadVersion version;
-  const Predictors* predictors = nullptr;  ///< instead of those that fit
 };
 
 ISOHF_KERNEL std::int32_t count_foretold(const std::int32_t* own, const std::int32_t* north, int first, int last) {
@@ -221,9 +219,9 @@ class TileCoder {
     }
   }
 
-  void try_streams(const CodingEffort& effort, const Predictors* given) {
+  void try_streams(const CodingEffort& effort) {
     PayloadHeader header = header_;
-    header.predictors = given != nullptr ? *given : fit_predictors<Wide>(lattice_, header.low, header.high, effort.fit);
+    header.predictors = fit_predictors<Wide>(lattice_, header.low, header.high, effort.fit);
     Residuals<Zigzagged> residuals(static_cast<std::size_t>(shape_.stored_vertex_count()), !voids_.empty());
     find_residuals<Wide, Zigzagged>(lattice_, voids_, header, residuals);
     header.energy_shift = choose_energy_shift(residuals);
@@ -233,7 +231,7 @@ class TileCoder {
     header.extra_bytes = static_cast<std::uint32_t>(streams.extra.size());
     std::vector<std::byte> bytes;
     write_payload_header(header, bytes);
-    std::vector<std::span<const std::byte>> parts = {bytes, mask_, std::as_bytes(std::span(header.predictors.map))};
+    std::vector<std::span<const std::byte>> parts = {bytes, mask_};
     parts.insert(parts.end(), streams.symbols.begin(), streams.symbols.end());
     parts.emplace_back(streams.extra);
     keep(deflate_parts(parts));
@@ -248,7 +246,7 @@ class TileCoder {
     payload.base = header_.base;
     payload.is_void.assign(voids_.begin(), voids_.end());
     payload.predictors = fit_predictors<Wide>(lattice_, header_.low, header_.high, effort.fit);
-    payload.has_weights = payload.predictors.weights.front() != kThirdRowWeights;
+    payload.has_weights = payload.predictors.weights != kThirdRowWeights;
     const std::vector<std::byte> bytes = encode_adaptive(lattice_, std::move(payload));
     if (bytes.size() > max_payload_bytes(shape_, header_.type)) return;
     keep(deflate_parts(std::array{std::span<const std::byte>(bytes)}));
@@ -297,8 +295,7 @@ Deflated encode_samples(const TileShape& shape, PayloadHeader header, std::span<
     }
   }
   if (!is_adaptive || !coder.has_any()) {
-    coder.try_efforts(request.level,
-                      [&](const CodingEffort& effort) { coder.try_streams(effort, request.predictors); });
+    coder.try_efforts(request.level, [&](const CodingEffort& effort) { coder.try_streams(effort); });
   }
   return coder.take();
 }
@@ -441,28 +438,17 @@ TileCodes void_tile(const TileShape& shape, const Quantisation& quantisation) {
   return tile;
 }
 
-namespace {
-
-EncodedTile encode(const TileShape& shape, const TileCodes& tile, const Request& request) {
+EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level, PayloadVersion version) {
   const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
   const bool is_float = tile.type == CodeType::kF32;
   ISOHF_ASSERT(tile.codes.size() == (is_float ? 0 : samples) && tile.heights.size() == (is_float ? samples : 0));
+  const Request request{level, version};
   try {
-    static_cast<void>(coding_effort(request.level));
+    static_cast<void>(coding_effort(level));
     return is_float ? encode_floats(shape, tile, request) : encode_codes(shape, tile, request);
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::kOutOfMemory, "no memory to code a tile of " + std::to_string(samples) + " samples");
   }
-}
-
-}  // namespace
-
-EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level, PayloadVersion version) {
-  return encode(shape, tile, {level, version});
-}
-
-EncodedTile encode_tile_with(const TileShape& shape, const TileCodes& tile, const Predictors& predictors) {
-  return encode(shape, tile, {kDefaultLevel, PayloadVersion::kFirst, &predictors});
 }
 
 }  // namespace isohf

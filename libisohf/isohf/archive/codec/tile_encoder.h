@@ -25,8 +25,4 @@ enum class PayloadVersion : std::uint8_t { kBest, kFirst, kAdaptive };
 [[nodiscard]] EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level = kDefaultLevel,
                                       PayloadVersion version = PayloadVersion::kBest);
 
-/// The same in version 1, by these predictors instead of one that fits: several of them and their map, as isohf wrote them
-/// before decision 44. For tests.
-[[nodiscard]] EncodedTile encode_tile_with(const TileShape& shape, const TileCodes& tile, const Predictors& predictors);
-
 }  // namespace isohf

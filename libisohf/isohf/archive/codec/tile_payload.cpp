@@ -49,12 +49,10 @@ void check_predictor(const PayloadHeader& header) {
   if (header.base < header.low || header.base > header.high) {
     refuse_payload(fmt::format("its base {} lies outside its range {}..{}", header.base, header.low, header.high));
   }
-  for (const PredictorWeights& weights : header.predictors.weights) {
-    int sum = 0;
-    for (const std::int16_t weight : weights) sum += std::abs(int{weight});
-    if (sum >= kWeightSumLimit)
-      refuse_payload(fmt::format("its weights add up to {}, must be below {}", sum, kWeightSumLimit));
-  }
+  int sum = 0;
+  for (const std::int16_t weight : header.predictors.weights) sum += std::abs(int{weight});
+  if (sum >= kWeightSumLimit)
+    refuse_payload(fmt::format("its weights add up to {}, must be below {}", sum, kWeightSumLimit));
   if (header.energy_shift > 31)
     refuse_payload(fmt::format("its energy shift is {}, must lie in 0..31", header.energy_shift));
   for (std::size_t i = 0; i < header.thresholds.size(); ++i) {
@@ -73,13 +71,8 @@ std::uint64_t max_payload_bytes(const TileShape& shape, CodeType type) {
   // One symbol each, a byte and a half where pairs are written apart, and its extra bits, at most 12 or 28; a run of
   // the mask takes a byte for each sample or fewer.
   const std::uint64_t extra_bits = type == CodeType::kF32 ? 28 : 12;
-  const std::uint64_t header = kPredictedHeaderBytes + 2 * kWeightCount * kMaxPredictors + 6 * kMaxContexts;
-  return header + block_count(shape) + samples + (samples * extra_bits + 7) / 8 + samples + 8;
-}
-
-std::size_t block_count(const TileShape& shape) {
-  return static_cast<std::size_t>(Predictors::blocks_across(shape.columns())) *
-         static_cast<std::size_t>(Predictors::blocks_across(shape.rows()));
+  const std::uint64_t header = kPredictedHeaderBytes + 2 * kWeightCount + 6 * kMaxContexts;
+  return header + samples + (samples * extra_bits + 7) / 8 + samples + 8;
 }
 
 void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& out) {
@@ -98,11 +91,9 @@ void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& o
   writer.write(static_cast<std::uint8_t>(header.symbol_counts.size()));
   writer.write(header.paired);
   const std::size_t weight_count = header.predictors.is_wide ? kWeightCount : kNearWeightCount;
-  writer.write(static_cast<std::uint8_t>(header.predictors.weights.size()));
+  writer.write(std::uint8_t{1});  // predictors
   writer.write(static_cast<std::uint8_t>(weight_count));
-  for (const PredictorWeights& weights : header.predictors.weights) {
-    for (std::size_t i = 0; i < weight_count; ++i) writer.write(weights[i]);
-  }
+  for (std::size_t i = 0; i < weight_count; ++i) writer.write(header.predictors.weights[i]);
   for (const std::uint16_t threshold : header.thresholds) writer.write(threshold);
   for (const std::uint32_t count : header.symbol_counts) writer.write(count);
 }
@@ -149,20 +140,16 @@ PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteRea
     refuse_payload(
         fmt::format("it has pairs in context {}, the last is {}", std::bit_width(header.paired) - 1, contexts - 1));
   }
-  const std::size_t predictors = reader.read<std::uint8_t>();
-  if (predictors < 1 || predictors > kMaxPredictors) {
-    refuse_payload(fmt::format("it has {} predictors, must have 1..{}", predictors, kMaxPredictors));
-  }
+  if (const auto predictors = reader.read<std::uint8_t>(); predictors != 1)
+    refuse_payload(fmt::format("it has {} predictors, must have 1", predictors));
   const std::size_t weight_count = reader.read<std::uint8_t>();
   if (weight_count != kNearWeightCount && weight_count != kWeightCount) {
-    refuse_payload(fmt::format("its predictors have {} weights, must have {} or {}", weight_count, kNearWeightCount,
-                               kWeightCount));
+    refuse_payload(
+        fmt::format("its predictor has {} weights, must have {} or {}", weight_count, kNearWeightCount, kWeightCount));
   }
   header.predictors.is_wide = weight_count == kWeightCount;
-  header.predictors.weights.assign(predictors, {});
-  for (PredictorWeights& weights : header.predictors.weights) {
-    for (std::size_t i = 0; i < weight_count; ++i) weights[i] = reader.read<std::int16_t>();
-  }
+  header.predictors.weights = {};
+  for (std::size_t i = 0; i < weight_count; ++i) header.predictors.weights[i] = reader.read<std::int16_t>();
   for (std::size_t i = 1; i < contexts; ++i) header.thresholds.push_back(reader.read<std::uint16_t>());
   std::uint64_t symbols = 0;
   for (std::size_t i = 0; i < contexts; ++i) {
@@ -173,19 +160,6 @@ PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteRea
   if (symbols > samples)
     refuse_payload(fmt::format("it has {} symbols, more than the tile's {} samples", symbols, samples));
   return header;
-}
-
-void read_block_map(const TileShape& shape, ByteReader& reader, Predictors& predictors) {
-  const std::size_t count = predictors.weights.size();
-  if (count == 1) return;
-  const auto bytes = reader.read_bytes(block_count(shape));
-  predictors.block_columns = Predictors::blocks_across(shape.columns());
-  predictors.map.clear();
-  for (const std::byte byte : bytes) {
-    const auto index = std::to_integer<std::uint8_t>(byte);
-    if (index >= count) refuse_payload(fmt::format("its map names predictor {}, the last is {}", index, count - 1));
-    predictors.map.push_back(index);
-  }
 }
 
 SymbolStreams::SymbolStreams(const PayloadHeader& header, ByteReader& reader) {

@@ -11,7 +11,7 @@
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/base/bytes.h"
 
-/// What stands in a tile's payload: its header, the map of its predictors, the symbols of its contexts
+/// What stands in a tile's payload: its header and the symbols of its contexts
 /// (docs/archive_format.md, "Tile payload").
 
 namespace isohf {
@@ -42,18 +42,12 @@ struct PayloadHeader {
   std::uint16_t paired = 0;                  ///< bit k: context k's symbols are stored in pairs (pair_coding.h)
 };
 
-/// Appends the header: 16 bytes, and where the samples differ the rest of it. Mask and map come behind it.
+/// Appends the header: 16 bytes, and where the samples differ the rest of it. The mask comes behind it.
 void write_payload_header(const PayloadHeader& header, std::vector<std::byte>& out);
 
-/// Blocks that the map of a tile of this shape has.
-[[nodiscard]] std::size_t block_count(const TileShape& shape);
-
-/// Reads a header, void mask and map of predictors left out, and checks all that it says against itself and the shape.
+/// Reads a header, the void mask left out, and checks all that it says against itself and the shape.
 /// Throws Error{kCorrupt, kUnsupported}.
 [[nodiscard]] PayloadHeader read_payload_header(const TileShape& shape, CodeType type, ByteReader& reader);
-
-/// Reads the map, which follows the mask where there are several predictors. Throws Error{kCorrupt}.
-void read_block_map(const TileShape& shape, ByteReader& reader, Predictors& predictors);
 
 /// The symbols of all contexts, unpaired.
 class SymbolStreams {

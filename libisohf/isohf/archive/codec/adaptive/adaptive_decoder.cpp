@@ -126,7 +126,7 @@ class AdaptiveDecoder {
       off[place] = 0;
     } else {
       const Neighbours<std::int32_t> at(lattice_, r);
-      const std::int32_t eighths = predict(at, payload_.predictors.of_block(r, 0), place);
+      const std::int32_t eighths = predict(at, payload_.predictors.of_row(r), place);
       const FinePrediction prediction(eighths);
       const std::uint32_t of_class = class_of(fine_energy(off, deviations(r - 1) + r % 2, deviations(r - 2), place));
       const std::uint32_t pattern = pattern_of(own[place - 1], at.north[place - 1], at.north[place + 1],

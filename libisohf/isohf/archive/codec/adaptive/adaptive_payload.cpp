@@ -45,7 +45,7 @@ void read_weights(AdaptivePayload& payload, bool is_wide, ByteReader& reader) {
   }
   if (sum >= kWeightSumLimit)
     refuse_tables(fmt::format("its weights add up to {}, must be below {}", sum, kWeightSumLimit));
-  payload.predictors.weights = {weights};
+  payload.predictors.weights = weights;
   payload.predictors.is_wide = is_wide;
 }
 
@@ -64,7 +64,7 @@ void write_adaptive_payload(const AdaptivePayload& payload, std::span<const std:
     writer.write(static_cast<std::uint16_t>(code));
   }
   for (std::size_t i = 0; payload.has_weights && i < (is_wide ? kWeightCount : kNearWeightCount); ++i) {
-    writer.write(payload.predictors.weights.front()[i]);
+    writer.write(payload.predictors.weights[i]);
   }
   if (!payload.is_void.empty()) {
     const std::vector<std::byte> mask = pack_void_mask(payload.is_void);

@@ -20,8 +20,8 @@ struct AdaptivePayload {
   std::int32_t low = 0;
   std::int32_t high = 0;
   std::int32_t base = 0;
-  bool has_weights = false;           ///< else those of the third row hold for all
-  Predictors predictors;              ///< one
+  bool has_weights = false;  ///< else those of the third row hold for all
+  Predictors predictors;
   std::vector<std::uint32_t> states;  ///< 1 or kMostStates
   std::vector<std::uint8_t> is_void;  ///< empty where nothing is void
   std::span<const std::byte> words;   ///< of two bytes each

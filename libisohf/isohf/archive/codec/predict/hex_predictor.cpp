@@ -89,19 +89,19 @@ ISOHF_KERNEL void predict_floats(const Neighbours<std::int64_t>& at, const Predi
 template <Wanted kWanted, typename Wide>
 void predict(const Lattice<Wide>& lattice, int r, const Predictors& predictors, Wide low, Wide high, Wide* out) {
   const Neighbours at(lattice, r);
-  predictors.for_stretches(r, at.first, at.last, [&](const PredictorWeights& weights, int begin, int end) {
-    const auto predict_stretch = [&](auto terms) {
-      if constexpr (std::is_same_v<Wide, std::int32_t>) {
-        vectorised<predict_codes<terms, kWanted>>(at, weights, begin, end, low, high, out);
-      } else {
-        constexpr bool kIsAbove = kWanted == Wanted::kAbove;
-        vectorised<predict_floats<false, terms, kIsAbove>, predict_floats<true, terms, kIsAbove>>(at, weights, begin,
-                                                                                                  end, low, high, out);
-      }
-    };
-    predictors.is_wide ? predict_stretch(std::integral_constant<std::size_t, kWeightCount>())
-                       : predict_stretch(std::integral_constant<std::size_t, kNearWeightCount>());
-  });
+  const PredictorWeights& weights = predictors.of_row(r);
+  const int end = at.last + 1;
+  const auto predict_with = [&](auto terms) {
+    if constexpr (std::is_same_v<Wide, std::int32_t>) {
+      vectorised<predict_codes<terms, kWanted>>(at, weights, at.first, end, low, high, out);
+    } else {
+      constexpr bool kIsAbove = kWanted == Wanted::kAbove;
+      vectorised<predict_floats<false, terms, kIsAbove>, predict_floats<true, terms, kIsAbove>>(at, weights, at.first,
+                                                                                                end, low, high, out);
+    }
+  };
+  predictors.is_wide ? predict_with(std::integral_constant<std::size_t, kWeightCount>())
+                     : predict_with(std::integral_constant<std::size_t, kNearWeightCount>());
 }
 
 template <typename Residual, typename Wide, typename Zigzagged>

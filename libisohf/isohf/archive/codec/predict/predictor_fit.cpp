@@ -210,9 +210,9 @@ Predictors fit_predictors(const Lattice<Wide>& lattice, Wide low, Wide high, con
   const int step = lattice.rows() >= kRowsToThin ? effort.thinning : 1;
   for (int pass = 0; pass < effort.passes; ++pass) {
     const auto solution = solve(moments.measure(predictors, 3 + pass % step, step), moments.terms());
-    const auto weights = solution ? changed(predictors.weights[0], *solution) : std::nullopt;
+    const auto weights = solution ? changed(predictors.weights, *solution) : std::nullopt;
     if (!weights) break;
-    predictors.weights[0] = *weights;
+    predictors.weights = *weights;
   }
   return predictors;
 }

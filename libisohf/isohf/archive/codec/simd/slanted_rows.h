@@ -107,7 +107,7 @@ inline constexpr std::size_t kNearestPairs = 2;  ///< the last ones, of the time
 [[nodiscard]] inline std::array<Words, kSlantedTerms.size()> slanted_weights(const Predictors& predictors, int top) {
   std::array<Words, kSlantedTerms.size()> weights{};
   for (int lane = 0; lane < SlantedRows::kLanes; ++lane) {
-    const PredictorWeights& of_row = predictors.of_block(top + lane, 0);
+    const PredictorWeights& of_row = predictors.of_row(top + lane);
     const auto weight_of = [&](int i) -> std::int32_t {
       if (i == kWeightOfNe) return std::accumulate(of_row.begin(), of_row.end(), 1 << kWeightBits, std::minus<>());
       return i < 0 ? 0 : of_row[static_cast<std::size_t>(i)];
