@@ -164,7 +164,7 @@ class HgtEncoder final : public RasterEncoder {
 
   void write(std::span<const std::byte> rows, std::int64_t /*count*/) override {
     swapped_.assign(rows.begin(), rows.end());
-    if (!kSwapsBytes) swap_byte_order(swapped_, sizeof(std::int16_t));
+    swap_byte_order(swapped_, sizeof(std::int16_t));
     out_.append(swapped_);
   }
   void close() override {}

@@ -138,7 +138,7 @@ void read_plain_samples(const RawFile& file, const SourceInfo& info, const Plain
       }
     }
   }
-  if (layout.big_endian != kSwapsBytes) swap_byte_order(samples, size);
+  if (layout.big_endian) swap_byte_order(samples, size);
   if (layout.from_south) turn_rows(samples, run);
   if (layout.stored_as == StoredAs::kVaxFloat) {
     for (std::size_t at = 0; at < samples.size(); at += sizeof(float)) {

@@ -78,7 +78,7 @@ class Isis3Source final : public FileSource {
       }
       row += rows;
     }
-    if (big_endian_ != kSwapsBytes) swap_byte_order(samples, static_cast<std::size_t>(size_));
+    if (big_endian_) swap_byte_order(samples, static_cast<std::size_t>(size_));
   }
 
  private:

@@ -109,7 +109,7 @@ bool PngDecoder::update(PngHeader& header, For use) {
   } else if (header.bit_depth < 8) {
     png_set_packing(png_);  // a byte each, values as stored
   }
-  if (header.bit_depth == 16 && !kSwapsBytes) png_set_swap(png_);  // PNG has the highest byte first
+  if (header.bit_depth == 16) png_set_swap(png_);  // PNG has the highest byte first
   if (header.interlaced) (void)png_set_interlace_handling(png_);
   png_read_update_info(png_, info_);
   header.row_bytes = png_get_rowbytes(png_, info_);

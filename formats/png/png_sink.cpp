@@ -89,7 +89,7 @@ class PngEncoder final : public RasterEncoder {
       png_set_tRNS(png_, info_, nullptr, 0, &gray);
     }
     png_write_info(png_, info_);
-    if (layout.bit_depth == 16 && !kSwapsBytes) png_set_swap(png_);  // PNG has the highest byte first
+    if (layout.bit_depth == 16) png_set_swap(png_);  // PNG has the highest byte first
     return true;
   }
 

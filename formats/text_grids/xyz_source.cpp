@@ -249,7 +249,6 @@ class XyzSource final : public PlainSource {
     info_.sample_type = whole_ ? SampleType::kInt32 : SampleType::kFloat64;
     const auto size = static_cast<std::uint64_t>(size_bytes(info_.sample_type));
     layout_.from_south = true;
-    layout_.big_endian = kSwapsBytes;  // the scratch file has memory's order
     if (by_columns_) {
       layout_.row_bytes = size;
       layout_.column_bytes = size * static_cast<std::uint64_t>(info_.height);

@@ -288,7 +288,7 @@ void TiffBlocks::read_strip_rows(const Window& part, TiffBlockSpan strip, std::i
       }
     }
   }
-  if (layout_.big_endian != kSwapsBytes) swap_byte_order({out, out_bytes}, sample_bytes_);
+  if (layout_.big_endian) swap_byte_order({out, out_bytes}, sample_bytes_);
 }
 
 // --- Decoded blocks
@@ -390,7 +390,7 @@ void TiffBlocks::decode_unit(const Unit& unit, TiffHandle& handle) const {
     handle.decode_block(block, layout_.tiled, decoded);
   }
   if (interleaved > 1) pick_channel(decoded.data(), unit.bytes, rows * layout_.block_width);
-  if (layout_.plain() && layout_.big_endian != kSwapsBytes) swap_byte_order({unit.bytes, plane_bytes}, sample_bytes_);
+  if (layout_.plain() && layout_.big_endian) swap_byte_order({unit.bytes, plane_bytes}, sample_bytes_);
 }
 
 // --- Large strips, row by row

@@ -70,7 +70,6 @@ void predict(const TiffStripLayout& layout, std::span<std::byte> rows) {
   for (std::size_t at = 0; at < rows.size(); at += row_bytes) {
     std::byte* row = rows.data() + at;
     if (is_floating(layout.sample_type)) {
-      swap_to_little({row, row_bytes}, size);
       difference_byte_planes(row, layout.samples_per_row, size, layout.channels, scratch);
     } else if (size == 1) {
       difference_row<std::uint8_t>(row, layout.samples_per_row, layout.channels);
@@ -87,10 +86,8 @@ void predict(const TiffStripLayout& layout, std::span<std::byte> rows) {
 /// The compression is a zlib stream. `rows` is overwritten. The same rows always give the same bytes.
 /// Throws Error{kOutOfMemory}.
 std::vector<std::byte> compress_tiff_strip(const TiffStripLayout& layout, std::span<std::byte> rows) {
-  const std::size_t size = size_bytes(layout.sample_type);
-  if (layout.compress) predict(layout, rows);
-  if (!layout.compress || !is_floating(layout.sample_type)) swap_to_little(rows, size);
   if (!layout.compress) return {rows.begin(), rows.end()};
+  predict(layout, rows);
   const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
       libdeflate_alloc_compressor(kLevel), libdeflate_free_compressor);
   if (!compressor) throw Error(ErrorCode::kOutOfMemory, "libdeflate ran out of memory");

@@ -19,27 +19,25 @@ namespace {
 /// The samples, little-endian, behind a header that may be empty. NaN in a grid of floats becomes its void value.
 class PlainEncoder final : public RasterEncoder {
  public:
-  PlainEncoder(OutputFile& out, const std::string& header, SampleType type, std::optional<float> void_value)
-      : out_(out), size_(size_bytes(type)), void_value_(void_value) {
+  PlainEncoder(OutputFile& out, const std::string& header, std::optional<float> void_value)
+      : out_(out), void_value_(void_value) {
     if (!header.empty()) out_.append(header);
   }
 
   void write(std::span<const std::byte> rows, std::int64_t /*count*/) override {
-    if (!void_value_) return out_.append(as_little(rows, size_, kept_));
+    if (!void_value_) return out_.append(rows);
     samples_.resize(rows.size() / sizeof(float));
     std::memcpy(samples_.data(), rows.data(), rows.size());
     std::replace_if(
         samples_.begin(), samples_.end(), [](float z) { return std::isnan(z); }, *void_value_);
-    out_.append(as_little(std::as_bytes(std::span(samples_)), size_, kept_));
+    out_.append(std::as_bytes(std::span(samples_)));
   }
   void close() override {}
 
  private:
   OutputFile& out_;
-  std::size_t size_;  ///< of a sample
   std::optional<float> void_value_;
   std::vector<float> samples_;
-  std::vector<std::byte> kept_;
 };
 
 void require(const RasterSpec& spec, SampleType type, const char* format) {
@@ -116,21 +114,21 @@ class AscEncoder final : public RasterEncoder {
 
 std::unique_ptr<RasterEncoder> encode_r16(OutputFile& out, const RasterSpec& spec) {
   require(spec, SampleType::kUint16, ".r16 and .raw store");
-  return std::make_unique<PlainEncoder>(out, "", spec.sample_type, std::nullopt);
+  return std::make_unique<PlainEncoder>(out, "", std::nullopt);
 }
 
 std::unique_ptr<RasterEncoder> encode_r32(OutputFile& out, const RasterSpec& spec) {
   require(spec, SampleType::kFloat32, ".r32 stores");
-  return std::make_unique<PlainEncoder>(out, "", spec.sample_type, std::nullopt);
+  return std::make_unique<PlainEncoder>(out, "", std::nullopt);
 }
 
 std::unique_ptr<RasterEncoder> encode_flt(OutputFile& out, const RasterSpec& spec) {
   require(spec, SampleType::kFloat32, "GridFloat stores");
-  return std::make_unique<PlainEncoder>(out, "", spec.sample_type, static_cast<float>(grid_void(spec)));
+  return std::make_unique<PlainEncoder>(out, "", static_cast<float>(grid_void(spec)));
 }
 
 std::unique_ptr<RasterEncoder> encode_npy(OutputFile& out, const RasterSpec& spec) {
-  return std::make_unique<PlainEncoder>(out, npy_header(spec), spec.sample_type, std::nullopt);
+  return std::make_unique<PlainEncoder>(out, npy_header(spec), std::nullopt);
 }
 
 std::unique_ptr<RasterEncoder> encode_asc(OutputFile& out, const RasterSpec& spec) {

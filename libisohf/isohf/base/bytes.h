@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -15,40 +13,20 @@
 
 namespace isohf {
 
-/// Files of ours, and most of others', have the lowest byte of a number first; memory has what the machine has.
-inline constexpr bool kSwapsBytes = std::endian::native == std::endian::big;
-static_assert(kSwapsBytes || std::endian::native == std::endian::little);
+static_assert(std::endian::native == std::endian::little, "numbers in files have the lowest byte first, as in memory");
 
 /// The number whose bytes stand at a place, lowest first, aligned or not.
 template <typename T>
 [[nodiscard]] T load_little(const void* at) {
-  std::array<std::byte, sizeof(T)> bytes;
-  std::memcpy(bytes.data(), at, sizeof(T));
-  if constexpr (kSwapsBytes) std::reverse(bytes.begin(), bytes.end());
-  return std::bit_cast<T>(bytes);
+  T value;
+  std::memcpy(&value, at, sizeof(T));
+  return value;
 }
 
 /// Puts the bytes of a number, lowest first; of more than there is room for the first `count`.
 template <typename T>
 void store_little(void* at, T value, std::size_t count = sizeof(T)) {
-  auto bytes = std::bit_cast<std::array<std::byte, sizeof(T)>>(value);
-  if constexpr (kSwapsBytes) std::reverse(bytes.begin(), bytes.end());
-  std::memcpy(at, bytes.data(), count);
-}
-
-/// Numbers of `size` bytes each, from memory's order to that of files or back: nothing to do on most machines.
-inline void swap_to_little(std::span<std::byte> numbers, std::size_t size) {
-  if constexpr (kSwapsBytes) {
-    for (; numbers.size() >= size; numbers = numbers.subspan(size)) std::ranges::reverse(numbers.first(size));
-  }
-}
-/// Their bytes as files have them: they themselves on most machines, else a copy in `kept`.
-inline std::span<const std::byte> as_little(std::span<const std::byte> numbers, std::size_t size,
-                                            std::vector<std::byte>& kept) {
-  if constexpr (!kSwapsBytes) return numbers;
-  kept.assign(numbers.begin(), numbers.end());
-  swap_to_little(kept, size);
-  return kept;
+  std::memcpy(at, &value, count);
 }
 
 /// Reads little-endian fields from a byte span; a read past the end throws Error{kCorrupt} naming the byte offset.

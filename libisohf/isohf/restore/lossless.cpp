@@ -294,7 +294,7 @@ std::vector<std::byte> SourceRowReader::read_next() {
   } catch (const Error& error) {
     throw error.within(fmt::format("{}: member \"{}\"", state.archive.path(), name));
   }
-  state.hash.add_numbers(raw, size_bytes(record.mapping.type));
+  state.hash.add(raw);
   state.next_row += rows;
   state.job.report({"rows", "rows", state.next_row, record.height});
   if (!at_end()) return raw;

@@ -24,11 +24,6 @@ void Sha256::add(std::span<const std::byte> bytes) {
   sha256_update(&state_->context, bytes.size(), reinterpret_cast<const std::uint8_t*>(bytes.data()));
 }
 
-void Sha256::add_numbers(std::span<const std::byte> numbers, std::size_t size) {
-  std::vector<std::byte> kept;
-  add(as_little(numbers, size, kept));
-}
-
 std::vector<std::byte> Sha256::finish() {
   std::vector<std::byte> digest(SHA256_DIGEST_SIZE);
   sha256_digest(&state_->context, digest.size(), reinterpret_cast<std::uint8_t*>(digest.data()));
@@ -52,10 +47,8 @@ std::string hex(std::span<const std::byte> digest) {
 }
 
 std::vector<std::byte> tile_content_digest(const TileCodes& tile) {
+  if (tile.type == CodeType::kU16) return sha256(std::as_bytes(std::span(tile.codes)));
   std::vector<std::byte> bytes;
-  if (tile.type == CodeType::kU16) {
-    return sha256(as_little(std::as_bytes(std::span(tile.codes)), sizeof(std::uint16_t), bytes));
-  }
   if (tile.type == CodeType::kU8) {
     bytes.reserve(tile.codes.size());
     for (const std::uint16_t code : tile.codes) bytes.push_back(static_cast<std::byte>(code & 0xFFU));

@@ -22,8 +22,6 @@ class Sha256 {
   Sha256& operator=(const Sha256&) = delete;
 
   void add(std::span<const std::byte> bytes);
-  /// Numbers of `size` bytes each that lie in memory, as files have them: lowest byte first.
-  void add_numbers(std::span<const std::byte> numbers, std::size_t size);
   [[nodiscard]] std::vector<std::byte> finish();  ///< 32 bytes; call once
 
  private:

@@ -135,7 +135,7 @@ LosslessRecord ResidualStage::write(const ReadTile& read_tile, std::size_t membe
       band.predicted.resize(static_cast<std::size_t>(rows * info.width));
       band.raw.resize(band.predicted.size() * size_bytes(info.sample_type));
       source_.read_window({0, row, info.width, rows}, band.raw);
-      if (!sha256) hash.add_numbers(band.raw, size_bytes(info.sample_type));
+      if (!sha256) hash.add(band.raw);
       surface_->read(row, rows, band.predicted);
     }
     oneapi::tbb::parallel_for(std::size_t{0}, bands.size(),
@@ -160,7 +160,7 @@ std::string hash_of_samples(HeightSource& source, const Job& job) {
     const std::int64_t rows = std::min(step, info.height - row);
     raw.resize(static_cast<std::size_t>(rows * info.width) * size_bytes(info.sample_type));
     source.read_window({0, row, info.width, rows}, raw);
-    hash.add_numbers(raw, size_bytes(info.sample_type));
+    hash.add(raw);
     job.report({"hash", "rows", row + rows, info.height});
   }
   return hex(hash.finish());

@@ -73,8 +73,7 @@ void write_adaptive_payload(const AdaptivePayload& payload, std::span<const std:
   }
   for (const std::uint32_t state : payload.states) writer.write(state);
   write_size(words.size(), writer);
-  std::vector<std::byte> kept;
-  writer.write_bytes(as_little(std::as_bytes(words), sizeof(words[0]), kept));
+  writer.write_bytes(std::as_bytes(words));
   writer.write_bytes(extra);
 }
 

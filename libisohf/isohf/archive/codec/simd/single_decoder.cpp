@@ -189,7 +189,6 @@ ISOHF_KERNEL bool restore_band(const Band& band) {
 }
 
 bool decode(const TileShape& shape, const Payload& payload, TileCodes& tile) {
-  if constexpr (kSwapsBytes) return false;  // lanes lie in vectors of both 16 and 32 bits
   const PayloadHeader& header = payload.header;
   const int columns = shape.columns();
   Constants constants;

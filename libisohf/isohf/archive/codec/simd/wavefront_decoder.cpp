@@ -413,7 +413,6 @@ class WavefrontDecoder {
 }  // namespace
 
 bool decode_wavefront(const TileShape& shape, const AdaptivePayload& payload, TileCodes& tile) {
-  if constexpr (kSwapsBytes) return false;  // lanes lie in vectors of both 16 and 32 bits
   return WavefrontDecoder(shape, payload, tile).run();
 }
 
