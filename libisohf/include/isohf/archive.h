@@ -115,12 +115,6 @@ class ArchiveReader {
   /// A member that is no tile by its name, in a table or loose; nullopt where there is none.
   [[nodiscard]] std::optional<MemberEntry> find_member(const std::string& name) const;
 
-  /// True where zlib inflates the tile's member to the same payload; tiles that are not stored need nothing inflated.
-  /// Throws Error{kCorrupt} like read_tile.
-  [[nodiscard]] bool zlib_reads(TileIndex tile, int plane = 0) const;
-  /// The same for any other member, whose bytes are known already; stored ones need nothing inflated.
-  [[nodiscard]] bool zlib_reads(const MemberEntry& member, std::span<const std::byte> bytes) const;
-
   /// Decodes one tile; a tile that is not stored comes back wholly void. Throws Error{kCorrupt} naming tile and byte.
   [[nodiscard]] TileCodes read_tile(TileIndex tile, int plane = 0) const;
 

@@ -117,7 +117,6 @@ inline constexpr int kStructure = 15;
 inline constexpr int kSourceLost = 16;
 inline constexpr int kSourceInvented = 17;
 inline constexpr int kLossless = 18;
-inline constexpr int kTileNotDeflate = 20;
 inline constexpr int kTexture = 21;
 inline constexpr int kVertex = 22;
 inline constexpr int kShadowSeeds = 23;

@@ -355,18 +355,6 @@ TileCodes ArchiveReader::read_tile(TileIndex tile, int plane) const {
   }
 }
 
-bool ArchiveReader::zlib_reads(TileIndex tile, int plane) const {
-  const TileEntry entry = tile_entry(tile, plane);
-  if (!entry.stored || reads_by_directory()) return true;  // zipped again by another program: not our stream
-  return zlib_inflates_to(SourceBytes(source(), entry.offset_bytes, entry.compressed_bytes).bytes(),
-                          state_->payload(entry, tile, plane));
-}
-
-bool ArchiveReader::zlib_reads(const MemberEntry& member, std::span<const std::byte> bytes) const {
-  if (!member.deflated || reads_by_directory()) return true;
-  return zlib_inflates_to(SourceBytes(source(), member.offset_bytes, member.compressed_bytes).bytes(), bytes);
-}
-
 std::vector<double> ArchiveReader::read_elevations(TileIndex tile, int plane) const {
   return elevations_of(read_tile(tile, plane), metadata().quantisation);
 }

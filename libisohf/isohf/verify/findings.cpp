@@ -34,8 +34,6 @@ const std::vector<FindingKind>& finding_catalogue() {
        "a texture is missing, cannot be decoded, or has another size than the metadata says"},
       {finding::kVertex, Severity::kError,
        "a stored vertex is further from the source, resampled as the metadata say, than half a step"},
-      {finding::kTileNotDeflate, Severity::kError,
-       "zlib does not inflate a member that a laxer decoder reads, or bits of it that none reads are not 0"},
       {finding::kShadowSeeds, Severity::kError,
        "shadow seeds are missing, cannot be read, or are not those of the archive's tiles"},
       {finding::kMetadata, Severity::kError,

@@ -92,7 +92,6 @@ TEST(LiteralInflater, TakesTheTilesOfEveryLevel) {
         Bytes out(tile.payload_bytes);
         ASSERT_TRUE(inflate_literals(tile.deflated, out)) << level << " " << to_string(type);
         ASSERT_EQ(out, reference(tile.deflated, out.size()));
-        ASSERT_TRUE(zlib_inflates_to(tile.deflated, out));
       }
     }
   }

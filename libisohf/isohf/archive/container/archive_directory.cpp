@@ -381,15 +381,14 @@ void check_member(const ByteSource& file, const ZipEntry& entry, std::uint64_t d
   const SourceBytes data(file, data_offset, entry.compressed_bytes);
   std::uint32_t crc = 0;
   std::uint64_t bytes = 0;
-  const bool is_stream = zlib_inflates(data.bytes(), [&](std::span<const std::byte> piece) {
+  const bool is_stream = inflate_in_pieces(data.bytes(), [&](std::span<const std::byte> piece) {
     crc = crc32(piece, crc);
     bytes += piece.size();
     return bytes <= entry.bytes;
   });
   if (is_stream && bytes == entry.bytes && crc == entry.crc32) return;
-  throw Error(ErrorCode::kCorrupt,
-              fmt::format("{}: zlib does not inflate it to {} bytes of the CRC-32 {:08x}, or its idle bits are not 0",
-                          describe(entry), entry.bytes, entry.crc32));
+  throw Error(ErrorCode::kCorrupt, fmt::format("{}: does not inflate to {} bytes of the CRC-32 {:08x}", describe(entry),
+                                               entry.bytes, entry.crc32));
 }
 
 }  // namespace isohf

@@ -93,8 +93,7 @@ struct OwnEntries {
 /// A deflated member may claim a thousand times the bytes that it has: one that claims more than this is looked through
 /// in pieces.
 inline constexpr std::uint64_t kInflatedAtOnceBytes = std::uint64_t{16} << 20U;
-/// Checks what member_from checks, and of a member looked through in pieces also that zlib reads it and that its idle
-/// bits are 0.
+/// Checks what member_from checks.
 void check_member(const ByteSource& file, const ZipEntry& entry, std::uint64_t data_offset);
 
 /// CRC-32 over the CRC-32s of the data of all members before the index as they stand in the file, in the directory's

@@ -47,55 +47,29 @@ void inflate_exactly(std::span<const std::byte> deflated, std::span<std::byte> o
   }
 }
 
-bool zlib_inflates(std::span<const std::byte> deflated, const std::function<bool(std::span<const std::byte>)>& take) {
-  const auto bit = [&](std::uint64_t at) { return std::to_integer<unsigned>(deflated[at / 8]) >> (at % 8) & 1U; };
-  const auto is_zero_to_next_byte = [&](std::uint64_t at) {
-    return at % 8 == 0 || std::to_integer<unsigned>(deflated[at / 8]) >> (at % 8) == 0;
-  };
+bool inflate_in_pieces(std::span<const std::byte> deflated,
+                       const std::function<bool(std::span<const std::byte>)>& take) {
   std::vector<std::byte> piece(std::size_t{1} << 16U);
   z_stream stream{};
   if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw Error(ErrorCode::kOutOfMemory, "no memory for zlib");
   // zlib reads through a pointer that it does not declare constant.
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(deflated.data()));
   std::size_t given = 0;
-  // Block by block, each from its three bits of header on.
-  constexpr int kAtBlockEnd = 128;
-  constexpr int kWasLast = 64;
-  std::uint64_t begin = 0;
-  bool is_whole = false;
+  int result = Z_OK;
   bool is_taken = true;
-  while (begin + 3 <= 8 * deflated.size()) {
-    if (bit(begin + 1) == 0 && bit(begin + 2) == 0 && !is_zero_to_next_byte(begin + 3)) break;
-    int result = Z_OK;
-    do {
-      if (stream.avail_in == 0) {
-        stream.avail_in = static_cast<uInt>(std::min<std::size_t>(deflated.size() - given, 1U << 30U));
-        given += stream.avail_in;
-      }
-      stream.next_out = reinterpret_cast<Bytef*>(piece.data());
-      stream.avail_out = static_cast<uInt>(piece.size());
-      result = inflate(&stream, Z_BLOCK);
-      is_taken = take(std::span(piece).first(piece.size() - stream.avail_out));
-    } while (is_taken && result == Z_OK && (stream.data_type & kAtBlockEnd) == 0 &&
-             (stream.avail_out == 0 || given < deflated.size()));
-    if (!is_taken || result != Z_OK || (stream.data_type & kAtBlockEnd) == 0) break;
-    begin = 8 * (given - stream.avail_in) - static_cast<std::uint64_t>(stream.data_type & 7);
-    if ((stream.data_type & kWasLast) == 0) continue;
-    is_whole = given == deflated.size() && stream.avail_in == 0 && is_zero_to_next_byte(begin);
-    break;
+  while (is_taken && result == Z_OK) {
+    if (stream.avail_in == 0) {
+      stream.avail_in = static_cast<uInt>(std::min<std::size_t>(deflated.size() - given, 1U << 30U));
+      given += stream.avail_in;
+    }
+    stream.next_out = reinterpret_cast<Bytef*>(piece.data());
+    stream.avail_out = static_cast<uInt>(piece.size());
+    result = inflate(&stream, Z_NO_FLUSH);  // Z_BUF_ERROR at an early end
+    is_taken = take(std::span(piece).first(piece.size() - stream.avail_out));
   }
+  const bool is_whole = is_taken && result == Z_STREAM_END && given == deflated.size() && stream.avail_in == 0;
   inflateEnd(&stream);
   return is_whole;
-}
-
-bool zlib_inflates_to(std::span<const std::byte> deflated, std::span<const std::byte> expected) {
-  auto rest = expected;
-  const bool is_same = zlib_inflates(deflated, [&](std::span<const std::byte> piece) {
-    if (piece.size() > rest.size() || !std::equal(piece.begin(), piece.end(), rest.begin())) return false;
-    rest = rest.subspan(piece.size());
-    return true;
-  });
-  return is_same && rest.empty();
 }
 
 std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t seed) {

@@ -17,13 +17,9 @@ namespace isohf {
 /// Thread-safe.
 void inflate_exactly(std::span<const std::byte> deflated, std::span<std::byte> out);
 
-/// Inflates with zlib, the reference that every archive must satisfy, in pieces that `take` may refuse: true where all of
-/// `deflated` is a stream, every piece is taken, and bits that no inflater reads, before stored bytes and behind the last
-/// block, are 0. libdeflate is laxer about code tables that zlib calls invalid.
-[[nodiscard]] bool zlib_inflates(std::span<const std::byte> deflated,
-                                 const std::function<bool(std::span<const std::byte>)>& take);
-/// The same; true where it makes exactly `expected`.
-[[nodiscard]] bool zlib_inflates_to(std::span<const std::byte> deflated, std::span<const std::byte> expected);
+/// Inflates in pieces that `take` may refuse: true if all of `deflated` is one stream and every piece is taken.
+[[nodiscard]] bool inflate_in_pieces(std::span<const std::byte> deflated,
+                                     const std::function<bool(std::span<const std::byte>)>& take);
 
 /// CRC-32 as ZIP has it; `seed` continues an earlier one.
 [[nodiscard]] std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t seed = 0);
