@@ -65,14 +65,14 @@ TEST(Archive, IsReadByThePageWithPayloadsOfEveryKind) {
   const TileGrid grid = TileGrid::make(TileShape::make(68, 67, 1), 1, 1, 100.0, 1.0 / 3.0);
   for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
     const TileCodes codes = test::make_tile(grid.shape(), type, test::Kind::kTerrain, 1);
-    for (const int level : {kMinLevel, kDefaultLevel}) {
+    for (const Effort effort : {Effort::kFast, Effort::kDefault}) {
       for (const PayloadVersion version : {PayloadVersion::kFirst, PayloadVersion::kAdaptive}) {
         std::filesystem::remove(path);
         ArchiveWriter writer(path, grid, WriterOptions{});
-        writer.add_tile(encode_tile(grid.shape(), codes, level, version));
+        writer.add_tile(encode_tile(grid.shape(), codes, effort, version));
         static_cast<void>(writer.finish(test::make_metadata(grid, type)));
         const std::string command = std::string("python3 \"" ISOHF_SOURCE_DIR "/docs/reader.py\" ") + path;
-        EXPECT_EQ(std::system(command.c_str()), 0) << to_string(type) << ", level " << level;
+        EXPECT_EQ(std::system(command.c_str()), 0) << to_string(type) << ", level " << level_of(effort);
       }
     }
   }

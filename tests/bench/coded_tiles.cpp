@@ -35,7 +35,7 @@ Coded::Coded(CodeType of, PayloadVersion version) : type(of) {
   const Quantisation quantisation{type, 0.0, type == CodeType::kU8 ? 6.0 : 0.5};
   for (std::size_t i = 0; i < kTiles; ++i) {
     quantise(quantisation, 0.0, terrain(i), tiles.emplace_back());
-    encoded.push_back(encode_tile(kShape, tiles.back(), kDefaultLevel, version));
+    encoded.push_back(encode_tile(kShape, tiles.back(), Effort::kDefault, version));
     payloads.emplace_back(encoded.back().payload_bytes);
     inflate_exactly(encoded.back().deflated, payloads.back());
   }
@@ -59,7 +59,7 @@ Inside::Inside() : lattice(kShape), residuals(samples(), false), sorted(samples(
     std::copy_n(codes.begin() + static_cast<std::ptrdiff_t>(at), columns, lattice.row(r));
     lattice.close_row(r);
   }
-  predictors = fit_predictors<std::int32_t>(lattice, 0, 65534, coding_effort(kDefaultLevel).fit);
+  predictors = fit_predictors<std::int32_t>(lattice, 0, 65534, coding_effort(Effort::kDefault).fit);
   std::vector<std::int32_t> halves(columns);
   std::vector<std::vector<std::uint8_t>> magnitudes(3, std::vector<std::uint8_t>(columns + 8));
   for (int r = 0; r < kShape.rows(); ++r) {
@@ -77,8 +77,8 @@ Inside::Inside() : lattice(kShape), residuals(samples(), false), sorted(samples(
   }
   histogram = count_energies({residuals.energies.data(), samples()});
   thresholds = choose_thresholds(symbols, {residuals.energies.data(), samples()}, histogram,
-                                 coding_effort(kDefaultLevel).streams.context_thinning);
-  streams = make_streams(residuals, coding_effort(kDefaultLevel).streams, header);
+                                 coding_effort(Effort::kDefault).streams.context_thinning);
+  streams = make_streams(residuals, coding_effort(Effort::kDefault).streams, header);
   const auto counts = sort_by_context(residuals, thresholds, histogram, sorted.data());
   least.assign(counts[0], std::byte{0});
   for (std::size_t i = 0; i < counts[0]; ++i) least[i] = static_cast<std::byte>(symbol_of(sorted.data()[i]));

@@ -99,13 +99,13 @@ BENCHMARK(quantise_heights)
     ->Arg(static_cast<int>(CodeType::kF32));
 
 void fit(benchmark::State& state) {
-  const FitEffort effort = coding_effort(static_cast<int>(state.range(0))).fit;
+  const FitEffort effort = coding_effort(static_cast<Effort>(state.range(0))).fit;
   for (auto _ : state) {
     benchmark::DoNotOptimize(fit_predictors<std::int32_t>(inside().lattice, 0, 65534, effort).weights.data());
   }
   set_samples(state, Inside::samples());
 }
-BENCHMARK(fit)->Name("fit (normal equations), level")->Arg(2)->Arg(kDefaultLevel)->Arg(8);
+BENCHMARK(fit)->Name("fit (normal equations), effort")->Arg(0)->Arg(1);
 
 void predict(benchmark::State& state) {
   std::vector<std::int32_t> halves(static_cast<std::size_t>(kShape.columns()));
@@ -154,7 +154,7 @@ void contexts(benchmark::State& state) {
   for (auto _ : state) {
     const std::vector<std::uint32_t> histogram = count_energies(of);
     benchmark::DoNotOptimize(
-        choose_thresholds(inside().symbols, of, histogram, coding_effort(kDefaultLevel).streams.context_thinning)
+        choose_thresholds(inside().symbols, of, histogram, coding_effort(Effort::kDefault).streams.context_thinning)
             .data());
   }
   set_samples(state, Inside::samples());
@@ -176,7 +176,7 @@ void streams(benchmark::State& state) {
   for (auto _ : state) {
     PayloadHeader header;
     benchmark::DoNotOptimize(
-        make_streams(inside().residuals, coding_effort(kDefaultLevel).streams, header).extra.data());
+        make_streams(inside().residuals, coding_effort(Effort::kDefault).streams, header).extra.data());
   }
   set_samples(state, Inside::samples());
 }

@@ -1,5 +1,5 @@
-// Codes the tiles of an archive again at every level, in turn, and decodes them; one thread, its own processor time.
-// usage: levels_bench ARCHIVE [REPEATS=3]; prints a JSON array with bytes and seconds of each level, the best of all
+// Codes the tiles of an archive again with every effort, in turn, and decodes them; one thread, its own processor time.
+// usage: levels_bench ARCHIVE [REPEATS=3]; prints a JSON array with bytes and seconds of each effort, the best of all
 // repeats, and the samples that were coded. Tiles whose samples are all equal are left out.
 
 #include <fmt/format.h>
@@ -56,11 +56,11 @@ void decode(const isohf::TileShape& shape, const std::vector<TileCodes>& tiles,
   }
 }
 
-std::vector<isohf::EncodedTile> encode(const isohf::TileShape& shape, const std::vector<TileCodes>& tiles, int level,
-                                       Cost& cost) {
+std::vector<isohf::EncodedTile> encode(const isohf::TileShape& shape, const std::vector<TileCodes>& tiles,
+                                       isohf::Effort effort, Cost& cost) {
   const double start = now();
   std::vector<isohf::EncodedTile> encoded;
-  for (const TileCodes& tile : tiles) encoded.push_back(encode_tile(shape, tile, level));
+  for (const TileCodes& tile : tiles) encoded.push_back(encode_tile(shape, tile, effort));
   cost.encode_s = std::min(cost.encode_s, now() - start);
   return encoded;
 }
@@ -85,15 +85,11 @@ int run(const std::string& path, int repeats) {
   const isohf::ArchiveReader archive(path);
   const std::vector<TileCodes> tiles = tiles_of(archive);
   const isohf::TileShape& shape = archive.grid().shape();
-  std::array<Cost, isohf::kMaxLevel> costs{};
-  std::array<std::vector<isohf::EncodedTile>, isohf::kMaxLevel> encoded;
+  constexpr std::array kEfforts = {isohf::Effort::kFast, isohf::Effort::kDefault, isohf::Effort::kBest};
+  std::array<Cost, kEfforts.size()> costs{};
   for (int repeat = 0; repeat < repeats; ++repeat) {
-    for (int level = isohf::kMinLevel; level <= isohf::kMaxLevel; ++level) {
-      const auto i = static_cast<std::size_t>(level - isohf::kMinLevel);
-      // Above 9 they are slow enough to be measured at once; reading is not.
-      if (level <= 9 || repeat == 0) encoded[i] = encode(shape, tiles, level, costs[i]);
-      read(shape, tiles, encoded[i], costs[i]);
-    }
+    for (std::size_t i = 0; i < kEfforts.size(); ++i)
+      read(shape, tiles, encode(shape, tiles, kEfforts[i], costs[i]), costs[i]);
   }
   const auto samples = static_cast<std::int64_t>(tiles.size()) * shape.stored_vertex_count();
   fmt::print("[");
@@ -101,7 +97,7 @@ int run(const std::string& path, int repeats) {
     fmt::print(
         "{}{{\"level\": {}, \"samples\": {}, \"bytes\": {}, \"encode_s\": {:.6f}, \"inflate_s\": {:.6f}, "
         "\"decode_s\": {:.6f}}}",
-        i == 0 ? "" : ",\n ", i + isohf::kMinLevel, samples, costs[i].bytes, costs[i].encode_s, costs[i].inflate_s,
+        i == 0 ? "" : ",\n ", level_of(kEfforts[i]), samples, costs[i].bytes, costs[i].encode_s, costs[i].inflate_s,
         costs[i].decode_s);
   }
   fmt::print("]\n");

@@ -45,13 +45,13 @@ TEST(JobFingerprint, TellsTreatmentsOfVoidsApart) {
   }
 }
 
-TEST(JobFingerprint, TellsLevelsApart) {
+TEST(JobFingerprint, TellsEffortsApart) {
   const SourceInfo info = source_info();
   std::set<std::string> found;
-  for (int level = kMinLevel; level <= kMaxLevel; ++level) {
+  for (const Effort effort : {Effort::kFast, Effort::kDefault, Effort::kBest}) {
     ConvertOptions options;
-    options.level = level;
-    EXPECT_TRUE(found.insert(job_fingerprint(info, make_plan(info, options.plan), options)).second) << level;
+    options.effort = effort;
+    EXPECT_TRUE(found.insert(job_fingerprint(info, make_plan(info, options.plan), options)).second) << level_of(effort);
   }
 }
 

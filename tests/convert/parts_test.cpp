@@ -400,7 +400,7 @@ TEST_F(Shards, AreRefusedWhereTheyAreNotWhatWasPlanned) {
   const auto merged = [&](const std::vector<std::string>& parts) {
     return refusal([&] { (void)merge_shards(plan, parts, folder / "refused.isohf"); });
   };
-  options.level = 2;
+  options.effort = Effort::kFast;
   EXPECT_THAT(refusal([&] { (void)convert_shard(source, plan, 1, folder / "a.isohf", options); }),
               HasSubstr("are not those that were planned: \"level 2\", planned was \"level"));
   EXPECT_THAT(refusal([&] { (void)convert_shard(source, plan, 4, folder / "a.isohf", options); }),
@@ -449,7 +449,7 @@ TEST(TileRange, MeetsAndIsPutAround) {
 
 TEST_F(Parts, DiffDecodesNothingAndListsMetadata) {
   const std::string whole = make("whole.isohf");
-  options.level = 3;
+  options.effort = Effort::kFast;
   const std::string other = make("other.isohf");
   const ArchiveDifference difference = diff_archives(whole, other);
   EXPECT_TRUE(difference.same_tiles());

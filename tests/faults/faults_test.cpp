@@ -74,7 +74,7 @@ class Faults : public testing::TestWithParam<Job> {
     if (!job().replaces) return;
     std::vector<std::string> arguments = job().arguments;
     arguments.insert(arguments.end(), {"-q"});
-    if (job().name == "convert_over") arguments.insert(arguments.end(), {"--level", "1"});
+    if (job().name == "convert_over") arguments.insert(arguments.end(), {"--effort", "fast"});
     if (job().name != "convert_over")
       arguments.insert(arguments.end(), {job().name == "shade_over" ? "--size" : "--size", "40x30"});
     run_plainly(arguments);

@@ -45,7 +45,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     const isohf::TileCodes tile = decode_tile(shape, type, payload);
     // What is read can be written, and reads back the same.
-    const isohf::EncodedTile encoded = encode_tile(shape, tile, isohf::kDefaultLevel, isohf::PayloadVersion::kAdaptive);
+    const isohf::EncodedTile encoded =
+        encode_tile(shape, tile, isohf::Effort::kDefault, isohf::PayloadVersion::kAdaptive);
     if (encoded.content_digest.size() != 32) std::abort();
     if (!encoded.is_empty) {
       std::vector<std::byte> written(encoded.payload_bytes);

@@ -149,7 +149,7 @@ class Soak : public ::testing::Test {
       options.shadow_seeds = ShadowSeedRequest{between(2.0, 30.0), {}};
       if (chance(0.5)) options.shadow_seeds->sun_deg = {5.0, 30.0};
     }
-    options.level = static_cast<int>(whole(1, 9));
+    options.effort = static_cast<Effort>(whole(0, 2));
     options.planes = chance(0.7);
     options.lossless = chance(0.4);
     return options;
@@ -258,7 +258,7 @@ std::string described(const SourceInfo& info, const ConvertOptions& options) {
       fmt::format("{} x {} {}, {}, {}, filter {}, {}, outside {}, type {}, level {}", info.width, info.height,
                   to_string(info.sample_type), to_string(info.georeference.registration), info.georeference.spacing_x,
                   to_string(*options.filter), to_string(options.acquisition), to_string(options.plan.outside),
-                  to_string(options.code_type), options.level);
+                  to_string(options.code_type), level_of(options.effort));
   if (options.z_range) text += fmt::format(", z_range {}:{}", options.z_range->first, options.z_range->second);
   if (options.step) text += fmt::format(", step {}", *options.step);
   return text;

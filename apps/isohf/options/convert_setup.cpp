@@ -164,12 +164,12 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments, C
               [&](const std::string& text) { options.convert.acquisition = acquisition_from_string(text); });
   line.words({"point", "box", "gaussian"});
   line.group("Size and speed");
-  line.option("--level", "N",
-              fmt::format("Effort to make the archive small, {} to {} (default {}); the elevations are the same",
-                          kMinLevel, kMaxLevel, kDefaultLevel),
+  line.option("--effort", "WORD",
+              "Effort to make the archive small: fast, default or best; the elevations are the same",
               [&](const std::string& text) {
-                options.convert.level = static_cast<int>(parse_whole_number(text, kMinLevel, kMaxLevel));
+                options.convert.effort = static_cast<Effort>(parse_word(text, {"fast", "default", "best"}));
               });
+  line.words({"fast", "default", "best"});
   line.flag("--no-planes", "Leave out the coarse planes, by which the archive is looked at from afar", no_planes);
   line.group("Shadows");
   line.option_or_numbers(

@@ -92,11 +92,11 @@ struct ConvertOptions {
   std::optional<ShadowSeedRequest> shadow_seeds;  ///< nullopt: none
   std::optional<TextureRequest> texture;          ///< nullopt: none
   bool overwrite = false;
-  bool resume = false;        ///< go on with what an interrupted run left in NAME.part
-  bool strict = false;        ///< a warning is an Error{kWarning}, and nothing is written
-  int level = kDefaultLevel;  ///< kMinLevel to kMaxLevel: the higher, the fewer bytes and the slower
-  bool planes = true;         ///< write coarse planes, by which the archive is looked at from afar
-  bool lossless = false;      ///< write residuals beside the tiles, so that the source's samples come back bit for bit
+  bool resume = false;  ///< go on with what an interrupted run left in NAME.part
+  bool strict = false;  ///< a warning is an Error{kWarning}, and nothing is written
+  Effort effort = Effort::kDefault;
+  bool planes = true;     ///< write coarse planes, by which the archive is looked at from afar
+  bool lossless = false;  ///< write residuals beside the tiles, so that the source's samples come back bit for bit
   /// Hold the surface, as drawn, to within that of every source sample that it has an elevation for. The smallest
   /// density that does is looked for, unless `plan` gives one; the step is chosen where none is asked for. Archives are
   /// made and measured up to eight times. Throws Error{kInvalidArgument} with the smallest error that was reached.

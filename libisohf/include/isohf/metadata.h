@@ -24,10 +24,11 @@ enum class CodeType { kU16, kU8, kF32 };
 [[nodiscard]] std::string to_string(CodeType type);                     ///< "u16", "u8", "f32"
 [[nodiscard]] CodeType code_type_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
 
-/// How hard the encoder tries: the higher, the fewer bytes and the slower. Readers need not know.
-inline constexpr int kMinLevel = 1;
-inline constexpr int kMaxLevel = 12;
-inline constexpr int kDefaultLevel = 5;
+/// How hard the encoder tries for few bytes: a hundredth more than by default, or a hundredth fewer for four times the
+/// time. Readers need not know.
+enum class Effort { kFast, kDefault, kBest };
+
+[[nodiscard]] int level_of(Effort effort);  ///< the metadata's number: 2, 5, 6
 
 /// One scale and offset for the whole dataset: elevation = offset + scale * code. Codes run from 0 to max_code(); the
 /// next one means void. For kF32 the float is the elevation itself, offset 0, scale 1, NaN is void.
@@ -153,7 +154,7 @@ struct Metadata {
   std::optional<Filter> filter = Filter::kBilinear;
   std::optional<Edges> edges = Edges::kOdd;  ///< how samples went on beyond the source's ends
   std::optional<Acquisition> acquisition = Acquisition{};
-  std::optional<int> level;  ///< that the tiles were coded at; tells readers nothing
+  std::optional<Effort> effort;  ///< that the tiles were coded with; tells readers nothing
   SourceRecord source;
   Statistics statistics;
   std::vector<std::string> textures;

@@ -52,7 +52,7 @@ AddPlanesSummary add_planes(const std::string& archive, const std::string& outpu
   Arena(job).execute([&] {
     std::optional<PlaneStage> planes;
     if (metadata.planes.count > 0) {
-      planes.emplace(planes_of(metadata), metadata.quantisation, metadata.level.value_or(kDefaultLevel), writer,
+      planes.emplace(planes_of(metadata), metadata.quantisation, metadata.effort.value_or(Effort::kDefault), writer,
                      RowRange{0, metadata.grid.tile_rows() - 1}, nullptr, scratch);
     }
     const TileRange tiles = tiles_here(reader);

@@ -119,7 +119,7 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
       : options.max_rounding ? fmt::format("rounding {}", *options.max_rounding)
                              : "auto",
       options.clamp_range, to_string(options.filter.value_or(kDefaultFilter)), to_string(options.acquisition),
-      options.level,
+      level_of(options.effort),
       options.shadow_seeds
           ? fmt::format("{} [{}]", options.shadow_seeds->sun_min_deg, fmt::join(options.shadow_seeds->sun_deg, " "))
           : "none");
@@ -183,7 +183,7 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.filter = options.filter.value_or(kDefaultFilter);
   metadata.edges = usual_edges(*metadata.filter);
   metadata.acquisition = options.acquisition;
-  metadata.level = options.level;
+  metadata.effort = options.effort;
   metadata.source = record_of(info, plan.frame, options.source_note);
   metadata.extensions.emplace_back(kStatisticsOfName, kStatisticsOfSource);
   metadata.producer = producer_of(options);

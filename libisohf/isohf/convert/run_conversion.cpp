@@ -103,7 +103,7 @@ struct VoidTile {
 
   explicit VoidTile(const Conversion& conversion)
       : codes(void_tile(conversion.plan.grid.shape(), conversion.quantisation)),
-        encoded(encode_tile(conversion.plan.grid.shape(), codes, conversion.options.level)) {}
+        encoded(encode_tile(conversion.plan.grid.shape(), codes, conversion.options.effort)) {}
 };
 
 void make_tile(const Conversion& conversion, const CodeSource& source, const CountedVertices& counted,
@@ -124,7 +124,7 @@ void make_tile(const Conversion& conversion, const CodeSource& source, const Cou
     tile.outliers = find_outliers(shape, conversion.limits, conversion.datum, heights);
   }
   EncodedTile& encoded = tile.encoded;
-  encoded = encode_tile(shape, codes, conversion.options.level);
+  encoded = encode_tile(shape, codes, conversion.options.effort);
   encoded.statistics = tile_statistics(counted, tile.index, codes, conversion.quantisation);
   encoded.statistics.clamped = tile.outliers.visible;
   encoded.statistics.worst_rounding = counts->worst_rounding;
@@ -227,9 +227,7 @@ void check(const ConvertOptions& options) {
   require_known("`code_type`", options.code_type, CodeType::kF32);
   require_known("filter", options.filter.value_or(kDefaultFilter), Filter::kBspline3);
   (void)with_taps(options.acquisition);
-  if (options.level < kMinLevel || options.level > kMaxLevel) {
-    refuse(fmt::format("level is {}, must be {} to {}", options.level, kMinLevel, kMaxLevel));
-  }
+  require_known("effort", options.effort, Effort::kBest);
   if (options.z_range) {
     const auto [low, high] = *options.z_range;
     if (!(low < high && std::isfinite(high - low)))
@@ -443,7 +441,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
       }
       if (coarse.count > 0) {
         planes.emplace(Planes(plan.grid, coarse.stride, coarse.count, plan.frame.wraps_x), conversion.quantisation,
-                       options.level, writer, rows, around ? &*around : nullptr,
+                       options.effort, writer, rows, around ? &*around : nullptr,
                        memory.planes_in_scratch ? ScratchFolder(job.scratch_folder) : std::nullopt);
       }
       write_tiles(conversion, writer,

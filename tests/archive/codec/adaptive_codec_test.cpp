@@ -21,8 +21,9 @@ namespace {
 
 using test::Kind;
 
-std::vector<std::byte> adaptive_payload(const TileShape& shape, const TileCodes& tile, int level = kDefaultLevel) {
-  const EncodedTile encoded = encode_tile(shape, tile, level, PayloadVersion::kAdaptive);
+std::vector<std::byte> adaptive_payload(const TileShape& shape, const TileCodes& tile,
+                                        Effort effort = Effort::kDefault) {
+  const EncodedTile encoded = encode_tile(shape, tile, effort, PayloadVersion::kAdaptive);
   std::vector<std::byte> payload(encoded.payload_bytes);
   inflate_exactly(encoded.deflated, payload);
   return payload;
@@ -45,16 +46,16 @@ TEST(AdaptiveCodec, BringsBackEveryTileByBothDecodersWithAndWithoutSimd) {
     for (const CodeType type : {CodeType::kU16, CodeType::kU8}) {
       for (const Kind kind : test::kAllKinds) {
         if (kind == Kind::kConstant || kind == Kind::kAllVoid) continue;
-        for (const int level : {1, kDefaultLevel, kMaxLevel}) {
+        for (const Effort effort : {Effort::kFast, Effort::kDefault, Effort::kBest}) {
           const TileCodes tile = test::make_tile(shape, type, kind, 7);
-          const std::vector<std::byte> payload = adaptive_payload(shape, tile, level);
+          const std::vector<std::byte> payload = adaptive_payload(shape, tile, effort);
           EXPECT_LE(payload.size(), max_payload_bytes(shape, type));
           if (!is_adaptive(payload)) continue;
           ASSERT_EQ(decode_adaptive(shape, type, payload), tile) << shape.columns() << " " << static_cast<int>(kind);
           ASSERT_EQ(decode_tile(shape, type, payload), tile) << shape.columns() << " " << static_cast<int>(kind);
           set_simd(false);
           EXPECT_EQ(decode_tile(shape, type, payload), tile);
-          EXPECT_EQ(adaptive_payload(shape, tile, level), payload);
+          EXPECT_EQ(adaptive_payload(shape, tile, effort), payload);
           set_simd(true);
         }
       }
@@ -78,7 +79,7 @@ TileCodes ground_in_steps(const TileShape& shape, CodeType type, unsigned shift)
 }
 
 std::size_t bytes_of(const TileShape& shape, const TileCodes& tile, PayloadVersion version) {
-  return encode_tile(shape, tile, kDefaultLevel, version).deflated.size();
+  return encode_tile(shape, tile, Effort::kDefault, version).deflated.size();
 }
 
 TEST(AdaptiveCodec, IsTakenWhereCodesAreCoarseAndPaysThere) {
@@ -103,14 +104,14 @@ TEST(AdaptiveCodec, IsLeftToTilesOfCoarseCodes) {
   }
 }
 
-TEST(AdaptiveCodec, IsTakenAtHighLevelsWhereItIsShorter) {
+TEST(AdaptiveCodec, IsTakenByTheBestEffortWhereItIsShorter) {
   const TileShape shape = TileShape::make(100, 99, 1);
   std::size_t taken = 0;
   for (const unsigned shift : {0U, 2U, 4U, 5U}) {
     const TileCodes tile = ground_in_steps(shape, CodeType::kU16, shift);
-    const std::size_t first = encode_tile(shape, tile, 6, PayloadVersion::kFirst).deflated.size();
-    const std::size_t adaptive = encode_tile(shape, tile, 6, PayloadVersion::kAdaptive).deflated.size();
-    EXPECT_EQ(encode_tile(shape, tile, 6).deflated.size(), std::min(first, adaptive)) << shift;
+    const std::size_t first = encode_tile(shape, tile, Effort::kBest, PayloadVersion::kFirst).deflated.size();
+    const std::size_t adaptive = encode_tile(shape, tile, Effort::kBest, PayloadVersion::kAdaptive).deflated.size();
+    EXPECT_EQ(encode_tile(shape, tile, Effort::kBest).deflated.size(), std::min(first, adaptive)) << shift;
     taken += adaptive < first ? 1 : 0;
   }
   EXPECT_GT(taken, 0U);
@@ -218,7 +219,7 @@ TEST(AdaptiveCodec, BringsBackRowsOfMoreSamplesThanSixteenBitsCount) {
   EXPECT_EQ(decode_tile(shape, CodeType::kU16, payload), tile);
 }
 
-TEST(TileCodec, TakesNoMoreBytesAtHigherLevels) {
+TEST(TileCodec, TakesNoMoreBytesWithMoreEffort) {
   const TileShape shape = TileShape::make(100, 99, 1);
   for (const unsigned shift : {0U, 3U, 5U, 6U, 7U, 8U, 10U, 12U, 14U}) {
     const TileCodes waves = ground_in_steps(shape, CodeType::kU16, shift);
@@ -229,9 +230,9 @@ TEST(TileCodec, TakesNoMoreBytesAtHigherLevels) {
     for (const PayloadVersion version : {PayloadVersion::kBest, PayloadVersion::kAdaptive}) {
       for (const TileCodes& tile : {waves, other}) {
         std::size_t before = std::numeric_limits<std::size_t>::max();
-        for (int level = kMinLevel; level <= kMaxLevel; ++level) {
-          const std::size_t bytes = encode_tile(shape, tile, level, version).deflated.size();
-          EXPECT_LE(bytes, before) << level << " " << shift << " " << static_cast<int>(version);
+        for (const Effort effort : {Effort::kFast, Effort::kDefault, Effort::kBest}) {
+          const std::size_t bytes = encode_tile(shape, tile, effort, version).deflated.size();
+          EXPECT_LE(bytes, before) << level_of(effort) << " " << shift << " " << static_cast<int>(version);
           before = bytes;
         }
       }

@@ -85,7 +85,7 @@ TEST(PairCoding, MakesTilesOfLittleDoubtSmaller) {
   for (std::int64_t i = 0; i < shape.stored_vertex_count(); ++i) {
     tile.codes.push_back(static_cast<std::uint16_t>(1000 + (random() % 8 == 0 ? 1 : 0)));
   }
-  const EncodedTile encoded = encode_tile(shape, tile, kDefaultLevel, PayloadVersion::kFirst);
+  const EncodedTile encoded = encode_tile(shape, tile, Effort::kDefault, PayloadVersion::kFirst);
   std::vector<std::byte> payload(encoded.payload_bytes);
   inflate_exactly(encoded.deflated, payload);
   ByteReader reader(payload);

@@ -43,7 +43,7 @@ void expect_read_again(const std::vector<Zigzagged>& values) {
   Residuals<Zigzagged> residuals(values.size(), false);
   std::copy(values.begin(), values.end(), residuals.zigzagged.data());
   std::fill_n(residuals.energies.data(), values.size(), std::uint16_t{0});  // so all are of one context
-  CodingEffort effort = coding_effort(kDefaultLevel);
+  CodingEffort effort = coding_effort(Effort::kDefault);
   effort.streams.has_pairs = false;
   PayloadHeader header;
   Streams streams = make_streams(residuals, effort.streams, header);

@@ -17,7 +17,7 @@ using test::Kind;
 
 std::vector<std::byte> payload_of(const TileShape& shape, CodeType type, Kind kind, std::uint32_t seed) {
   const EncodedTile tile =
-      encode_tile(shape, test::make_tile(shape, type, kind, seed), kDefaultLevel, PayloadVersion::kFirst);
+      encode_tile(shape, test::make_tile(shape, type, kind, seed), Effort::kDefault, PayloadVersion::kFirst);
   std::vector<std::byte> payload(tile.payload_bytes);
   inflate_exactly(tile.deflated, payload);
   return payload;

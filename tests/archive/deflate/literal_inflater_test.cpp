@@ -82,15 +82,15 @@ TEST(LiteralInflater, TakesNoiseThatIsStoredAndCodesLongerThanItsTable) {
   }
 }
 
-TEST(LiteralInflater, TakesTheTilesOfEveryLevel) {
+TEST(LiteralInflater, TakesTheTilesOfEveryEffort) {
   const TileShape shape = TileShape::make(68, 67, 1);
-  for (int level = kMinLevel; level <= kMaxLevel; ++level) {
+  for (const Effort effort : {Effort::kFast, Effort::kDefault, Effort::kBest}) {
     for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
       for (const test::Kind kind : test::kAllKinds) {
-        const EncodedTile tile = encode_tile(shape, test::make_tile(shape, type, kind, 5), level);
+        const EncodedTile tile = encode_tile(shape, test::make_tile(shape, type, kind, 5), effort);
         if (tile.is_empty) continue;
         Bytes out(tile.payload_bytes);
-        ASSERT_TRUE(inflate_literals(tile.deflated, out)) << level << " " << to_string(type);
+        ASSERT_TRUE(inflate_literals(tile.deflated, out)) << level_of(effort) << " " << to_string(type);
         ASSERT_EQ(out, reference(tile.deflated, out.size()));
       }
     }

@@ -148,20 +148,20 @@ TEST_F(ConvertCommand, EveryOptionChangesWhatItSays) {
   EXPECT_NEAR(fitted.at("grid").at("world_height").get<double>(), 200.0, 1e-9);
 }
 
-TEST_F(ConvertCommand, LevelsStoreTheSameElevationsInFewerBytes) {
+TEST_F(ConvertCommand, EffortsStoreTheSameElevationsInFewerBytes) {
   const auto content = [&](const std::string& name, const std::vector<std::string>& more) {
     convert(name, more);
     return json::parse(run_isohf({"info", folder / name, "--json"}).out).at("metadata");
   };
-  const json fast = content("fast.isohf", {"--quiet", "--level", "1"});
+  const json fast = content("fast.isohf", {"--quiet", "--effort", "fast"});
   const json usual = content("usual.isohf", {"--quiet"});
-  const json small = content("small.isohf", {"--quiet", "--level", "12"});
-  EXPECT_EQ(fast.at("level"), 1);
-  EXPECT_EQ(small.at("level"), 12);
+  const json small = content("small.isohf", {"--quiet", "--effort", "best"});
+  EXPECT_EQ(fast.at("level"), 2);
+  EXPECT_EQ(small.at("level"), 6);
   EXPECT_EQ(fast.at("content_sha256"), usual.at("content_sha256"));
   EXPECT_EQ(small.at("content_sha256"), usual.at("content_sha256"));
   EXPECT_GT(std::filesystem::file_size(folder / "fast.isohf"), std::filesystem::file_size(folder / "small.isohf"));
-  EXPECT_EQ(run_isohf({"convert", folder / "a.tif", folder / "x.isohf", "--level", "13"}).exit_code, 2);
+  EXPECT_EQ(run_isohf({"convert", folder / "a.tif", folder / "x.isohf", "--effort", "more"}).exit_code, 2);
 }
 
 TEST_F(ConvertCommand, MaxRoundingBoundsEveryVertex) {

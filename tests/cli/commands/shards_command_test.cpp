@@ -95,8 +95,8 @@ TEST_F(ShardsCommand, AreRefusedByNumberPlanAndSource) {
   expect_refused({"convert", "--plan", "land.plan", "--shard", "one", "-o", "a.isohf"}, 2, "must be K/N, as in 3/16");
   expect_refused({"convert", "--plan", "land.plan", "-o", "a.isohf"}, 2, "which shard? Give --shard K/N");
   for (const char* command : {"convert", "scan"}) {
-    expect_refused({command, "--plan", "land.plan", "--shard", "1/3", "-o", "a.isohf", "--level", "9"}, 2,
-                   "--level is settled by the plan; isohf plan takes it");
+    expect_refused({command, "--plan", "land.plan", "--shard", "1/3", "-o", "a.isohf", "--effort", "best"}, 2,
+                   "--effort is settled by the plan; isohf plan takes it");
   }
   expect_refused({"convert", "--plan", "none.plan", "--shard", "1/3", "-o", "a.isohf"}, 1, "none.plan: ");
   expect_refused({"convert", "--plan", "land.tif", "--shard", "1/3", "-o", "a.isohf"}, 1,

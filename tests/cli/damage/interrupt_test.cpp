@@ -56,10 +56,10 @@ TEST_F(Interrupt, SigintIsExit130AndResumingGivesTheSameBytes) {
   EXPECT_EQ(folder.names(), (std::vector<std::string>{"big.isohf", "big.tif", "straight.isohf"}));
 }
 
-/// Tiles of two levels in one archive would not be the bytes of either.
-TEST_F(Interrupt, ResumingAtAnotherLevelIsRefusedAndHarmsNothing) {
+/// Tiles of two efforts in one archive would not be the bytes of either.
+TEST_F(Interrupt, ResumingWithAnotherEffortIsRefusedAndHarmsNothing) {
   ASSERT_EQ(stopped_by(SIGINT).exit_code, 130);
-  const RunResult other = run_program(command("big.isohf", {"--resume", "--level", "9"}));
+  const RunResult other = run_program(command("big.isohf", {"--resume", "--effort", "best"}));
   EXPECT_EQ(other.exit_code, 2);
   EXPECT_THAT(other.err, testing::HasSubstr("big.isohf.part"));
   EXPECT_FALSE(exists("big.isohf"));

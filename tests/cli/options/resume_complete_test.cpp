@@ -62,7 +62,7 @@ TEST_F(ResumeComplete, TakesAwayTheJournalOfARunThatWasKilledAtItsEnd) {
 
 TEST_F(ResumeComplete, SaysWhatDiffers) {
   expect_refused({"--filter", "bspline3"}, R"(was made otherwise: filter "nearest", not "bspline3"; --overwrite)");
-  expect_refused({"--filter", "nearest", "--level", "3"}, "level 5, not 3");
+  expect_refused({"--filter", "nearest", "--effort", "fast"}, "level 5, not 2");
   expect_refused({"--filter", "nearest", "--type", "u8"}, R"(samples.type "u16", not "u8")");
   expect_refused({"--filter", "nearest", "--z-range", "0:500"}, "other elevation codes, ");
   expect_refused({"--filter", "nearest", "--lossless"}, "residuals");

@@ -57,10 +57,10 @@ TEST(JsonError, IsADocumentForAWrongCommandLine) {
 }
 
 TEST(JsonError, SaysWhatAnOptionWasAndMustBe) {
-  const json error = error_of({"convert", "a", "b", "--level", "77", "--json"}, 2);
-  EXPECT_EQ(error.at("where"), "convert: --level");
+  const json error = error_of({"convert", "a", "b", "--effort", "77", "--json"}, 2);
+  EXPECT_EQ(error.at("where"), "convert: --effort");
   EXPECT_EQ(error.at("found"), "'77'");
-  EXPECT_EQ(error.at("required"), "a whole number from 1 to 12");
+  EXPECT_EQ(error.at("required"), "fast, default or best");
 }
 
 TEST(JsonError, NamesTheFileThatIsMissingExistsOrIsUnknown) {

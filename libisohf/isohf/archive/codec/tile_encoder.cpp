@@ -23,23 +23,11 @@
 namespace isohf {
 namespace {
 
-//      passes thinning wide     thinning pairs
-constexpr std::array<CodingEffort, kMaxLevel> kEfforts = {{
-    {.fit = {0, 1, false}, .streams = {15, false}},
-    {.fit = {2, 9, false}, .streams = {3, true}},
-    {.fit = {2, 9, false}, .streams = {3, true}},
-    {.fit = {2, 9, true}, .streams = {3, true}},
-    {.fit = {2, 9, true}, .streams = {3, true}},
-    {.fit = {2, 5, true}, .streams = {3, true}},
-    {.fit = {3, 5, true}, .streams = {3, true}},
-    {.fit = {3, 3, true}, .streams = {3, true}},
-    {.fit = {4, 3, true}, .streams = {1, true}},
-    {.fit = {6, 3, true}, .streams = {1, true}},
-    {.fit = {6, 1, true}, .streams = {1, true}},
-    {.fit = {8, 1, true}, .streams = {1, true}},
-}};
-constexpr int kNearLevel = 3;               ///< the last with twelve weights
-constexpr int kDenseLevel = 6;              ///< from it on tiles are coded in both versions (decision 62)
+//                                      passes thinning wide     thinning pairs
+constexpr CodingEffort kPlainEffort = {.fit = {0, 1, false}, .streams = {15, false}};
+constexpr CodingEffort kNearEffort = {.fit = {2, 9, false}, .streams = {3, true}};
+constexpr CodingEffort kWideEffort = {.fit = {2, 9, true}, .streams = {3, true}};
+constexpr CodingEffort kDenseEffort = {.fit = {2, 5, true}, .streams = {3, true}};
 constexpr std::size_t kFewBytes = 1200;     ///< of a payload in which weights of its own may not pay
 constexpr std::int64_t kFewSamples = 1024;  ///< below, there is little to learn from
 constexpr std::int64_t kCoarseShare = 110;  ///< of 256 samples that their neighbours foretell (decision 44)
@@ -174,7 +162,7 @@ Deflated deflate_parts(std::span<const std::span<const std::byte>> parts) {
 
 /// What encode_tile was asked for.
 struct Request {
-  int level;
+  Effort effort;
   PayloadVersion version;
 };
 
@@ -207,16 +195,15 @@ class TileCoder {
     header_.mask_bytes = static_cast<std::uint32_t>(mask_.size());
   }
 
-  /// The level's effort; from the default on also those between, and of little the lower ones, so that no level takes
-  /// more bytes than the one before.
+  /// The usual coding of an effort first. The best effort tries that of the default too, and little payloads are tried with
+  /// simpler ones, so that no effort takes more bytes than a faster one.
   template <typename Try>
-  void try_efforts(int level, const Try& try_effort) {
-    const int first = std::min(level, kDefaultLevel);
-    for (int tried = first; tried <= level; ++tried) try_effort(coding_effort(tried));
+  void try_efforts(Effort effort, const Try& try_effort) {
+    try_effort(coding_effort(effort));
+    if (effort == Effort::kBest) try_effort(kDenseEffort);
     if (best_.bytes.size() >= kFewBytes) return;
-    for (const int tried : {kMinLevel, kNearLevel}) {
-      if (tried < first) try_effort(coding_effort(tried));
-    }
+    try_effort(kPlainEffort);
+    if (effort != Effort::kFast) try_effort(kNearEffort);
   }
 
   void try_streams(const CodingEffort& effort) {
@@ -289,13 +276,13 @@ Deflated encode_samples(const TileShape& shape, PayloadHeader header, std::span<
     const bool is_best = request.version == PayloadVersion::kBest && shape.stored_vertex_count() >= kFewSamples;
     is_adaptive = request.version == PayloadVersion::kAdaptive || (is_best && is_coarse(lattice));
     // Where codes are coarse, twelve weights may be worth as much as eighteen.
-    const int level = request.level == kMinLevel ? kMinLevel : std::max(request.level, kDefaultLevel);
-    if (is_adaptive || (is_best && request.level >= kDenseLevel)) {
-      coder.try_efforts(level, [&](const CodingEffort& effort) { coder.try_adaptive(effort); });
+    const Effort effort = request.effort == Effort::kBest ? Effort::kBest : Effort::kDefault;
+    if (is_adaptive || (is_best && request.effort == Effort::kBest)) {
+      coder.try_efforts(effort, [&](const CodingEffort& effort) { coder.try_adaptive(effort); });
     }
   }
   if (!is_adaptive || !coder.has_any()) {
-    coder.try_efforts(request.level, [&](const CodingEffort& effort) { coder.try_streams(effort); });
+    coder.try_efforts(request.effort, [&](const CodingEffort& effort) { coder.try_streams(effort); });
   }
   return coder.take();
 }
@@ -418,12 +405,8 @@ EncodedTile encode_floats(const TileShape& shape, const TileCodes& tile, const R
 
 }  // namespace
 
-CodingEffort coding_effort(int level) {
-  if (level < kMinLevel || level > kMaxLevel) {
-    throw Error(ErrorCode::kInvalidArgument, "level " + std::to_string(level) + ", must be " +
-                                                 std::to_string(kMinLevel) + " to " + std::to_string(kMaxLevel));
-  }
-  return kEfforts[static_cast<std::size_t>(level - kMinLevel)];
+CodingEffort coding_effort(Effort effort) {
+  return effort == Effort::kFast ? kNearEffort : kWideEffort;
 }
 
 TileCodes void_tile(const TileShape& shape, const Quantisation& quantisation) {
@@ -438,13 +421,12 @@ TileCodes void_tile(const TileShape& shape, const Quantisation& quantisation) {
   return tile;
 }
 
-EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level, PayloadVersion version) {
+EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, Effort effort, PayloadVersion version) {
   const auto samples = static_cast<std::size_t>(shape.stored_vertex_count());
   const bool is_float = tile.type == CodeType::kF32;
   ISOHF_ASSERT(tile.codes.size() == (is_float ? 0 : samples) && tile.heights.size() == (is_float ? samples : 0));
-  const Request request{level, version};
+  const Request request{effort, version};
   try {
-    static_cast<void>(coding_effort(level));
     return is_float ? encode_floats(shape, tile, request) : encode_codes(shape, tile, request);
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::kOutOfMemory, "no memory to code a tile of " + std::to_string(samples) + " samples");

@@ -6,23 +6,23 @@
 
 namespace isohf {
 
-/// What the encoder does at a level.
+/// What the encoder does for one coding of a tile.
 struct CodingEffort {
   FitEffort fit;
   StreamEffort streams;
 };
 
-/// The effort of a level. Throws Error{kInvalidArgument} where it is not kMinLevel to kMaxLevel.
-[[nodiscard]] CodingEffort coding_effort(int level);
+/// The first coding that is tried.
+[[nodiscard]] CodingEffort coding_effort(Effort effort);
 
-/// The versions of payloads. The best: 2 where codes are coarse for their ground, else 1 (decision 44), at high levels the
+/// The versions of payloads. The best: 2 where codes are coarse for their ground, else 1 (decision 44), with the best effort the
 /// shorter one (decision 62).
 enum class PayloadVersion : std::uint8_t { kBest, kFirst, kAdaptive };
 
 /// Codes one tile: hexagonal prediction, residuals in contexts, Deflate. Deterministic; thread-safe.
-/// `tile` holds shape.stored_vertex_count() samples; `level` is kMinLevel to kMaxLevel; `version` is for tests: kAdaptive
-/// also for few samples. Never fails on data; throws Error{kOutOfMemory}, and Error{kInvalidArgument} for another level.
-[[nodiscard]] EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, int level = kDefaultLevel,
+/// `tile` holds shape.stored_vertex_count() samples; `version` is for tests: kAdaptive also for few samples. Never fails
+/// on data; throws Error{kOutOfMemory}.
+[[nodiscard]] EncodedTile encode_tile(const TileShape& shape, const TileCodes& tile, Effort effort = Effort::kDefault,
                                       PayloadVersion version = PayloadVersion::kBest);
 
 }  // namespace isohf

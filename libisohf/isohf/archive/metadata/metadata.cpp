@@ -266,7 +266,12 @@ void metadata_members(JsonMembers& json, Metadata& metadata) {
   json.name("filter", metadata.filter, filter_from_string);
   json.name("edges", metadata.edges, edges_from_string);
   json.name("acquisition", metadata.acquisition, acquisition_from_string);
-  json("level", metadata.level, {.presence = JsonRule::kAbsent, .least = 1, .most = 12});
+  std::optional<int> level = metadata.effort ? std::optional(level_of(*metadata.effort)) : std::nullopt;
+  json("level", level, {.presence = JsonRule::kAbsent, .least = 1});
+  metadata.effort.reset();
+  for (const Effort effort : {Effort::kFast, Effort::kDefault, Effort::kBest}) {
+    if (level == level_of(effort)) metadata.effort = effort;
+  }
   json.object("source", [&](JsonMembers& source) { source_members(source, metadata.source); });
   Statistics& counted = metadata.statistics;
   json.object("statistics", "min", counted.min, "max", counted.max, "mean", counted.mean, "vertices", counted.vertices,
@@ -384,6 +389,10 @@ void check(const Metadata& metadata) {
 
 std::string to_string(CodeType type) {
   return type == CodeType::kU16 ? "u16" : type == CodeType::kU8 ? "u8" : "f32";
+}
+
+int level_of(Effort effort) {
+  return effort == Effort::kFast ? 2 : effort == Effort::kDefault ? 5 : 6;
 }
 
 CodeType code_type_from_string(const std::string& text) {

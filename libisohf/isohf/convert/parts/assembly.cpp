@@ -285,7 +285,7 @@ void Assembly::read(std::span<const AssemblyInput* const> inputs, TileIndex firs
             // Another tool's members may be stored, and their ranges are not known: only what was packed again is coded again.
             if (archive->reads_by_directory()) {
               const std::vector<std::byte> digest = std::move(encoded.content_digest);
-              encoded = encode_tile(metadata_.grid.shape(), tile.codes, metadata_.level.value_or(kDefaultLevel));
+              encoded = encode_tile(metadata_.grid.shape(), tile.codes, metadata_.effort.value_or(Effort::kDefault));
               if (!digest.empty()) encoded.content_digest = digest;
             }
             if (request_.checks_digests || encoded.content_digest.empty()) {

@@ -218,7 +218,7 @@ PartSummary write_parts(PartsJob parts, const std::string& output, const PartOpt
       const CodeType type = metadata.quantisation.type;
       ScratchFolder scratch;
       if (plane_builder_memory_bytes(all, type, false) > kMostPlaneBytes) scratch = folder_of(output);
-      planes.emplace(all, metadata.quantisation, metadata.level.value_or(kDefaultLevel), writer,
+      planes.emplace(all, metadata.quantisation, metadata.effort.value_or(Effort::kDefault), writer,
                      RowRange{0, metadata.grid.tile_rows() - 1}, nullptr, scratch);
     }
     AssemblyRequest request{parts.inputs,

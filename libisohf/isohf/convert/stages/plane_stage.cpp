@@ -4,12 +4,14 @@
 
 namespace isohf {
 
-PlaneStage::PlaneStage(const Planes& planes, const Quantisation& quantisation, int level, ArchiveWriter& writer,
+PlaneStage::PlaneStage(const Planes& planes, const Quantisation& quantisation, Effort effort, ArchiveWriter& writer,
                        const RowRange& rows, const TilesAround* around, const ScratchFolder& scratch)
     : around_(around),
       builder_(
           planes, quantisation.type,
-          [shape = planes.grid(0).shape(), level](const TileCodes& codes) { return encode_tile(shape, codes, level); },
+          [shape = planes.grid(0).shape(), effort](const TileCodes& codes) {
+            return encode_tile(shape, codes, effort);
+          },
           [&writer, rows, planes](int plane, TileIndex tile, const EncodedTile& encoded) {
             const std::int64_t height = planes.scale(plane);  // in rows of tiles
             const bool is_ours = tile.row * height <= rows.last && (tile.row + 1) * height > rows.first;

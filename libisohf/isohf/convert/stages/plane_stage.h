@@ -12,11 +12,11 @@ namespace isohf {
 /// the tiles alone; a conversion that is resumed reads back those that the rows in hand need.
 class PlaneStage {
  public:
-  /// Goes on where the writer stands; it outlives this. `level` is that of the tiles. On the caller's oneTBB arena.
+  /// Goes on where the writer stands; it outlives this. `effort` is that of the tiles. On the caller's oneTBB arena.
   ///   rows    of tiles that are made: all but a shard's; tiles of planes above none of them are not made
   ///   around  the rows beside a shard's, so that its planes' tiles are those of the whole
   ///   scratch keeps rows of tiles where memory has no room for them
-  PlaneStage(const Planes& planes, const Quantisation& quantisation, int level, ArchiveWriter& writer,
+  PlaneStage(const Planes& planes, const Quantisation& quantisation, Effort effort, ArchiveWriter& writer,
              const RowRange& rows, const TilesAround* around = nullptr, const ScratchFolder& scratch = std::nullopt);
 
   /// Any thread.
