@@ -8,6 +8,7 @@
 #include <map>
 
 #include "isohf/archive/codec/tile_encoder.h"
+#include "lattice/vertex_below.h"
 
 namespace isohf {
 namespace {
@@ -145,7 +146,7 @@ TEST(PlaneBuilder, CodesAreThoseOfTheVerticesBelow) {
         bool is_void = true;
         for (std::int64_t v = 0; v < c.shape.stored_vertex_count(); ++v) {
           const GridVertex vertex{static_cast<int>(v % c.shape.columns()), static_cast<int>(v / c.shape.columns())};
-          const TileVertex below = planes.vertex_below(plane, tile, vertex);
+          const test::TileVertex below = test::vertex_below(planes, plane, tile, vertex);
           const TileCodes& from = tiles[static_cast<std::size_t>(grid.flat_index(below.tile))];
           const auto at = static_cast<std::size_t>(below.vertex.row * c.shape.columns() + below.vertex.column);
           const bool beyond = planes.is_beyond(plane, coarse.lattice_vertex(tile, vertex));

@@ -17,6 +17,7 @@
 #include "isohf/shade.h"
 #include "isohf/surface.h"
 #include "isohf/verify.h"
+#include "lattice/vertex_below.h"
 #include "support/altered_archive.h"
 #include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
@@ -77,7 +78,7 @@ TEST(PlaneStage, PlanesOfEveryCodeTypeHoldWhatTheTilesBelowHold) {
         for (int r = 1; r < shape.rows() - 1; r += 3) {
           for (int c = 1; c < shape.columns() - 3; ++c) {
             if (planes.is_beyond(plane, planes.grid(plane).lattice_vertex(tile, {c, r}))) continue;
-            const TileVertex below = planes.vertex_below(plane, tile, {c, r});
+            const test::TileVertex below = test::vertex_below(planes, plane, tile, {c, r});
             const double wanted = archive.read_elevations(
                 below.tile)[static_cast<std::size_t>(below.vertex.row * shape.columns() + below.vertex.column)];
             const double found = heights[static_cast<std::size_t>(r * shape.columns() + c)];

@@ -11,6 +11,7 @@
 #include "isohf/lattice/stitch.h"
 #include "isohf/lattice/strip.h"
 #include "lattice/mesh_check.h"
+#include "lattice/vertex_below.h"
 
 namespace isohf {
 namespace {
@@ -78,7 +79,7 @@ TEST(Planes, EachVertexIsOneOfTheTilesBelow) {
         for (std::int64_t i = 0; i < shape.stored_vertex_count(); ++i) {
           const GridVertex vertex = vertex_of(shape, static_cast<std::uint32_t>(i));
           const LatticeVertex v = coarse.lattice_vertex(coarse.tile_at(t), vertex);
-          const TileVertex below = planes.vertex_below(plane, coarse.tile_at(t), vertex);
+          const test::TileVertex below = test::vertex_below(planes, plane, coarse.tile_at(t), vertex);
           ASSERT_TRUE(fine.contains(below.tile)) << name_of(planes);
           ASSERT_TRUE(is_visible(shape, below.vertex) && below.vertex.row % 2 == 1) << name_of(planes);
           ASSERT_EQ(fine.lattice_vertex(below.tile, below.vertex), planes.place(plane, v)) << name_of(planes);
@@ -338,17 +339,8 @@ TEST(Planes, SideListsArePartsOfTheStitchListsWoundTheOtherWay) {
 TEST(Planes, LevelsRunThroughAllPlanes) {
   const Planes planes(TileGrid::make(TileShape::make(12, 19, 4), 64, 64, 1.0, 1.0), 8, 2, false);
   EXPECT_EQ(planes.levels(), 10);
-  EXPECT_EQ(planes.at_level(2), (PlaneLevel{0, 2}));
-  EXPECT_EQ(planes.at_level(3), (PlaneLevel{1, 0}));
-  EXPECT_EQ(planes.at_level(6), (PlaneLevel{2, 0}));
-  EXPECT_EQ(planes.at_level(9), (PlaneLevel{2, 3}));
-  const PlaneBlend blend = planes.blend(2.75);
-  EXPECT_EQ(blend.first, (PlaneLevel{1, 0}));
-  EXPECT_EQ(blend.second, (PlaneLevel{0, 2}));
-  EXPECT_EQ(blend.alpha, 0.5);
   const Planes none(planes.grid(0), 0, 0, false);
   EXPECT_EQ(none.levels(), 4);
-  EXPECT_EQ(none.at_level(3), (PlaneLevel{0, 3}));
 }
 
 TEST(Planes, CoarsestPlaneThatIsFineEnough) {

@@ -7,6 +7,7 @@
 #include <random>
 #include <set>
 
+#include "lattice/grid_point.h"
 #include "lattice/mesh_check.h"
 
 namespace isohf {
@@ -57,64 +58,9 @@ TEST(TileMapping, InverseReturnsEveryVisibleVertex) {
         const GridPoint back = grid_from_object(shape, ObjectPoint{static_cast<double>(p.x), static_cast<double>(p.z)});
         ASSERT_EQ(back.column, c);
         ASSERT_EQ(back.row, r);
-        const ObjectPoint again = object_from_grid(shape, GridPoint{static_cast<double>(c), static_cast<double>(r)});
-        ASSERT_EQ(again.x, p.x);
-        ASSERT_EQ(again.z, p.z);
       }
     }
   }
-}
-
-// On the coordinates of a 1/8 grid all arithmetic is exact, and every half triangle holds dozens of points.
-TEST(TileMapping, InverseUndoesTheMappingOnAFineGridExactly) {
-  for (const TileShape& shape : deepest_shapes(9, 11)) {
-    for (int x8 = 0; x8 <= 16 * shape.cell_columns(); ++x8) {
-      for (int z8 = 0; z8 <= 8 * shape.cell_rows(); ++z8) {
-        const ObjectPoint point{x8 / 8.0, z8 / 8.0};
-        const ObjectPoint back = object_from_grid(shape, grid_from_object(shape, point));
-        ASSERT_EQ(back.x, point.x) << point.x << "," << point.z;
-        ASSERT_EQ(back.z, point.z) << point.x << "," << point.z;
-      }
-    }
-  }
-}
-
-TEST(TileMapping, InverseUndoesTheMappingAtRandomPoints) {
-  constexpr unsigned kSeed = 20240611;
-  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
-  std::mt19937_64 random(kSeed);
-  for (const TileShape& shape : {TileShape::make(5, 5, 1), TileShape::make(12, 11, 3), TileShape::make(212, 243, 4)}) {
-    std::uniform_real_distribution<double> any_x(0.0, 2.0 * shape.cell_columns());
-    std::uniform_real_distribution<double> any_z(0.0, shape.cell_rows());
-    for (int i = 0; i < 20000; ++i) {
-      // Every second point in a half triangle's reach of an edge.
-      ObjectPoint point{any_x(random), any_z(random)};
-      if (i % 4 == 1) point.x = std::fmod(point.x, 1.0);
-      if (i % 4 == 3) point.x = 2.0 * shape.cell_columns() - std::fmod(point.x, 1.0);
-      const ObjectPoint back = object_from_grid(shape, grid_from_object(shape, point));
-      // A few roundings of coordinates below 512.
-      ASSERT_NEAR(back.x, point.x, 1e-12);
-      ASSERT_NEAR(back.z, point.z, 1e-12);
-    }
-  }
-}
-
-TEST(TileMapping, InverseTakesPointsOutsideToTheSquare) {
-  const TileShape shape = TileShape::make(8, 9, 1);
-  const double inf = std::numeric_limits<double>::infinity();
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto expect_inside = [&](const ObjectPoint& point) {
-    const GridPoint grid = grid_from_object(shape, point);
-    EXPECT_GE(grid.column, 1.0);
-    EXPECT_LE(grid.column, shape.columns() - 2);
-    EXPECT_GE(grid.row, 1.0);
-    EXPECT_LE(grid.row, shape.rows() - 2);
-  };
-  for (const double x : {-inf, -1e300, -1e-300, 0.0, 8.0, 8.0000001, 1e300, inf, nan}) {
-    for (const double z : {-inf, -1e300, 0.0, 6.0, 6.5, inf, nan}) expect_inside({x, z});
-  }
-  EXPECT_EQ(grid_from_object(shape, ObjectPoint{-5.0, -5.0}).column, 1.0);
-  EXPECT_EQ(grid_from_object(shape, ObjectPoint{50.0, 50.0}).column, shape.columns() - 3);
 }
 
 /// All triangles' vertices around a tile, in a 3x3 neighbourhood: which places are vertices of the mesh.

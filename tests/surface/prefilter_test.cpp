@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <numbers>
 #include <random>
 
 #include "isohf/error.h"
@@ -77,7 +76,6 @@ TEST(Prefilter, OfInterpolatingKernelsAndPointsIsTheIdentity) {
   for (const Filter filter : kAll) {
     const Prefilter prefilter = make(filter);
     EXPECT_EQ(prefilter.is_identity(), filter != Filter::kBspline3) << to_string(filter);
-    EXPECT_NEAR(prefilter.worst_gain(), 1.0, 1e-12);
   }
   EXPECT_TRUE(make(Filter::kNearest, "box").is_identity());
   EXPECT_EQ(make(Filter::kNearest, "box").halo(), 0);

@@ -103,12 +103,6 @@ struct GridVertex {
   friend bool operator==(const GridVertex&, const GridVertex&) = default;
 };
 
-/// A position in grid space, fractional; integer at vertices.
-struct GridPoint {
-  double column;
-  double row;
-};
-
 /// A vertex in a tile's object space.
 struct ObjectVertex {
   int x;
@@ -144,15 +138,6 @@ struct ObjectPoint {
   }
   return 2 * column + (row & 1) + slide - 3;
 }
-
-/// The exact inverse of Eq. 1 on the tile's visible square, extended piecewise linearly inside each triangle (errata
-/// E12): a point in a triangle maps to the point with the same barycentric weights in the grid-space triangle.
-/// x in [0, 2(C-4)], z in [0, R-3]; points outside are moved to the nearest point of the square, NaN to any.
-[[nodiscard]] GridPoint grid_from_object(const TileShape& shape, ObjectPoint point);
-
-/// The piecewise inverse's own inverse: a fractional grid position to object space, by barycentric weights.
-/// The position must lie on visible triangles.
-[[nodiscard]] ObjectPoint object_from_grid(const TileShape& shape, GridPoint point);
 
 /// A tile's place in the grid of tiles, column before row.
 struct TileIndex {

@@ -58,26 +58,4 @@ template <typename T>
   return sum;
 }
 
-/// The slope of a triangle's plane: rise per world unit eastwards (x) and southwards (z).
-struct Gradient {
-  double dx;
-  double dz;
-};
-
-/// Slope of the triangle that a Barycentric names, in world units; its upward face normal is (-dx, 1, -dz).
-/// elevations [C x R], world units; NaN is void and makes the slope NaN.
-template <typename T>
-[[nodiscard]] Gradient face_gradient(const TileGrid& grid, const Barycentric& at, View2D<const T> elevations) {
-  const auto height = [&](std::size_t i) {
-    return static_cast<double>(elevations(at.vertices[i].column, at.vertices[i].row));
-  };
-  const ObjectVertex g = object_from_grid(grid.shape(), at.vertices[0]);
-  const ObjectVertex h = object_from_grid(grid.shape(), at.vertices[1]);
-  const ObjectVertex i = object_from_grid(grid.shape(), at.vertices[2]);
-  // G and I share a row: the slope along it is direct; the slope across follows from H.
-  const double per_x = (height(2) - height(0)) / (i.x - g.x);
-  const double per_z = (height(1) - height(0) - per_x * (h.x - g.x)) / (h.z - g.z);
-  return {per_x / grid.sigma_x(), per_z / grid.sigma_z()};
-}
-
 }  // namespace isohf

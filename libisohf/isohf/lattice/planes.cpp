@@ -4,7 +4,6 @@
 #include <bit>
 
 #include "isohf/base/assert.h"
-#include "isohf/lattice/lod.h"
 
 namespace isohf {
 namespace {
@@ -89,16 +88,6 @@ Planes::Planes(const TileGrid& grid, int stride, int count, bool wraps_x)
   }
 }
 
-PlaneLevel Planes::at_level(int level) const {
-  const int plane = count() == 0 ? 0 : std::min(level / step_, count());
-  return {plane, level - plane * step_};
-}
-
-PlaneBlend Planes::blend(double level) const {
-  const LodBlend blend = lod_blend(level, levels());
-  return {at_level(blend.first), at_level(blend.second), blend.alpha};
-}
-
 int Planes::plane_for_spacing(double step_x, double step_z) const {
   int plane = 0;
   while (plane < count() && 2.0 * grid(plane + 1).sigma_x() <= step_x && grid(plane + 1).sigma_z() <= step_z) ++plane;
@@ -132,17 +121,6 @@ std::int64_t Planes::x_below(int below, int plane, std::int64_t x) const {
 std::int64_t Planes::z_below(int below, int plane, std::int64_t z) const {
   return std::clamp(z * scale(plane - below), std::int64_t{0},
                     grid(below).tile_rows() * grid(below).shape().cell_rows());
-}
-
-TileVertex Planes::vertex_below(int plane, TileIndex tile, GridVertex vertex) const {
-  if (plane == 0) return {tile, vertex};
-  const LatticeVertex at = place(plane, grid(plane).lattice_vertex(tile, vertex));
-  const TileGrid& fine = grid(0);
-  const std::int64_t width = 2 * fine.shape().cell_columns();
-  const std::int64_t height = fine.shape().cell_rows();
-  const TileIndex holds{std::min(at.x / width, fine.tile_columns() - 1), std::min(at.z / height, fine.tile_rows() - 1)};
-  return {holds,
-          {static_cast<int>((at.x - holds.column * width) / 2 + 1), static_cast<int>(at.z - holds.row * height + 1)}};
 }
 
 TileRange Planes::below(int plane, TileIndex tile) const {

@@ -34,27 +34,6 @@ enum class TileSide { kWest, kEast, kNorth, kSouth };
 /// other way, so that they leave the coarser tile's border. Finest first. C-4 and (R-3)/2 are multiples of `stride`.
 [[nodiscard]] std::vector<std::uint32_t> side_stitch_indices(const TileShape& shape, TileSide side, int stride);
 
-/// A level of one plane.
-struct PlaneLevel {
-  int plane;
-  int level;  ///< λ
-  friend bool operator==(const PlaneLevel&, const PlaneLevel&) = default;
-};
-
-/// What to draw at a fractional level, as LodBlend says.
-struct PlaneBlend {
-  PlaneLevel first;
-  PlaneLevel second;
-  double alpha;
-};
-
-/// A vertex of plane 0.
-struct TileVertex {
-  TileIndex tile;
-  GridVertex vertex;
-  friend bool operator==(const TileVertex&, const TileVertex&) = default;
-};
-
 /// All planes of a heightfield. Immutable.
 class Planes {
  public:
@@ -73,9 +52,6 @@ class Planes {
 
   /// Levels 0 to levels()-1 through all planes.
   [[nodiscard]] int levels() const { return count() * step_ + grid(0).shape().levels(); }
-  [[nodiscard]] PlaneLevel at_level(int level) const;
-  /// lod_blend() through all planes. `level` as fractional_level(area_px, levels()) gives it.
-  [[nodiscard]] PlaneBlend blend(double level) const;
   /// The coarsest plane whose vertices lie no further apart than so many world units along x and z; 0 where none.
   [[nodiscard]] int plane_for_spacing(double step_x, double step_z) const;
 
@@ -83,8 +59,6 @@ class Planes {
   [[nodiscard]] LatticeVertex place(int plane, LatticeVertex vertex) const { return place_in(0, plane, vertex); }
   /// True where it is further beyond the tiles of plane 0 than has an elevation: a void.
   [[nodiscard]] bool is_beyond(int plane, LatticeVertex vertex) const;
-  /// The vertex of plane 0 whose code the stored vertex of a plane's tile, padding included, has if it isn't beyond.
-  [[nodiscard]] TileVertex vertex_below(int plane, TileIndex tile, GridVertex vertex) const;
 
   /// The tile of plane+1 above a tile, and the tiles of plane-1 below one.
   [[nodiscard]] TileIndex above(TileIndex tile) const { return {tile.column / stride_, tile.row / stride_}; }

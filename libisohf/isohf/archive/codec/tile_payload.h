@@ -18,9 +18,8 @@ namespace isohf {
 
 inline constexpr std::uint8_t kCodecVersion = 1;
 inline constexpr std::size_t kMaxContexts = 16;
-inline constexpr std::size_t kFixedHeaderBytes = 16;      ///< of every payload
-inline constexpr std::size_t kPredictedHeaderBytes = 30;  ///< of one whose samples are not all equal, without weights
-                                                          ///< and contexts
+/// Bytes of the header of a payload whose samples are not all equal, without weights and contexts.
+inline constexpr std::size_t kPredictedHeaderBytes = 30;
 
 /// The largest payload that a tile of this shape and type can have.
 [[nodiscard]] std::uint64_t max_payload_bytes(const TileShape& shape, CodeType type);

@@ -53,7 +53,7 @@ std::shared_ptr<const TileSource::Part> TileSource::read(TileIndex tile) {
     part->raw = rows_.rows(part->rows);
     return part;
   }
-  RowRange columns = RowSampler::no_rows();
+  RowRange columns = RowRange::none();
   for (std::int64_t column = part->first_column; column < part->end_column; ++column) {
     const RowRange& needed = columns_needed_[static_cast<std::size_t>(column)];
     columns = {std::min(columns.first, needed.first), std::max(columns.last, needed.last)};

@@ -203,8 +203,8 @@ void in_parallel(std::int64_t count, std::int64_t grain, const Work& work) {
 
 }  // namespace
 
-Prefilter::Prefilter(std::vector<double> taps, int border, double worst_gain)
-    : taps_(std::move(taps)), border_(taps_.size() == 1 ? 0 : border), worst_gain_(worst_gain) {}
+Prefilter::Prefilter(std::vector<double> taps, int border)
+    : taps_(std::move(taps)), border_(taps_.size() == 1 ? 0 : border) {}
 
 Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition) {
   const Acquisition used = with_taps(acquisition);
@@ -266,7 +266,7 @@ Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition) {
                                                          to_string(acquisition), kLongestHalo));
   }
   if (taps.size() == 1) taps[0] = 1.0;
-  Prefilter prefilter(std::move(taps), (kernel.taps() + 1) / 2, worst_gain);
+  Prefilter prefilter(std::move(taps), (kernel.taps() + 1) / 2);
   const std::lock_guard lock(mutex);
   if (made.size() == kMostMade) made.clear();
   made.emplace(key, prefilter);
@@ -274,7 +274,7 @@ Prefilter Prefilter::make(Filter filter, const Acquisition& acquisition) {
 }
 
 Prefilter Prefilter::smoothing() {
-  return {{20.0 / 64.0, 15.0 / 64.0, 6.0 / 64.0, 1.0 / 64.0}, 0, 1.0};
+  return {{20.0 / 64.0, 15.0 / 64.0, 6.0 / 64.0, 1.0 / 64.0}, 0};
 }
 
 void Prefilter::filter_rows(View2D<float> band, bool wraps) const {

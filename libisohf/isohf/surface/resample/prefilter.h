@@ -48,9 +48,6 @@ class Prefilter {
   [[nodiscard]] int halo() const { return static_cast<int>(taps_.size()) - 1 + 2 * border_; }
   /// Places beyond a sample, into voids, that receive coefficients: half the kernel's taps; 0 for the identity.
   [[nodiscard]] int border() const { return border_; }
-  /// How much more the highest-gain frequency is amplified along one axis than interpolation of point samples by the
-  /// same kernel would: 1 for a point, about pi/2 for a box, exp((pi sigma)^2 / 2) for a Gaussian.
-  [[nodiscard]] double worst_gain() const { return worst_gain_; }
   /// p[k] for k = 0, 1, ...; even.
   [[nodiscard]] const std::vector<double>& impulse_response() const { return taps_; }
 
@@ -68,11 +65,10 @@ class Prefilter {
   void filter(View2D<float> raster) const;
 
  private:
-  Prefilter(std::vector<double> taps, int border, double worst_gain);
+  Prefilter(std::vector<double> taps, int border);
 
   std::vector<double> taps_;
   int border_;
-  double worst_gain_;
 };
 
 }  // namespace isohf

@@ -40,8 +40,6 @@ class RowSampler {
   /// `limits`, relative to the bands' datum, hold the continuation beyond the source's edge only.
   RowSampler(const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel, const ElevationRange& limits);
 
-  /// What add_rows_needed starts from.
-  [[nodiscard]] static RowRange no_rows() { return RowRange::none(); }
   /// Widens `range` by the source rows that a row of vertices reads.
   void add_rows_needed(double world_z, RowRange& range) const;
 

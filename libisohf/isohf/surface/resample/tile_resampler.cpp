@@ -83,7 +83,7 @@ GridResampler::GridResampler(const TileGrid& grid, const SourceAxis& axis_x, con
     : grid_(grid), axis_x_(axis_x), kernel_(kernel), sampler_(axis_x, axis_z, kernel, limits) {}
 
 RowRange GridResampler::rows_needed(std::int64_t tile_row) const {
-  RowRange range = RowSampler::no_rows();
+  RowRange range = RowRange::none();
   for (int r = 0; r < grid_.shape().rows(); ++r) {
     sampler_.add_rows_needed(grid_.world_from_lattice(grid_.lattice_vertex({0, tile_row}, {0, r})).z, range);
   }
@@ -91,7 +91,7 @@ RowRange GridResampler::rows_needed(std::int64_t tile_row) const {
 }
 
 RowRange GridResampler::columns_needed(std::int64_t tile_column) const {
-  RowRange range = RowSampler::no_rows();
+  RowRange range = RowRange::none();
   for (const int parity : {0, 1}) {
     add_columns_needed(axis_x_, taps_of_tile(grid_, axis_x_, kernel_, {tile_column, 0}, parity), range);
   }

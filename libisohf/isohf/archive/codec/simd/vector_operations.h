@@ -45,15 +45,5 @@ ISOHF_KERNEL Ints choose_by_sign(Ints signs, Ints negative, Ints otherwise) {
 #endif
   return signs < 0 ? negative : otherwise;
 }
-template <bool kIsWide>
-ISOHF_KERNEL Longs choose_by_sign(Longs signs, Longs negative, Longs otherwise) {
-#if defined(ISOHF_HAS_WIDE_BUILTINS)
-  using Doubles = double __attribute__((vector_size(32)));
-  if constexpr (kIsWide) {
-    return (Longs)__builtin_ia32_blendvpd256((Doubles)otherwise, (Doubles)negative, (Doubles)signs);
-  }
-#endif
-  return signs < 0 ? negative : otherwise;
-}
 
 }  // namespace isohf
