@@ -61,7 +61,7 @@ class Recorder {
       : builder(
             planes, type,
             [&planes](const TileCodes& codes) {
-              EncodedTile encoded = encode_tile(planes.grid(0).shape(), codes, 1);
+              EncodedTile encoded = encode_tile(planes.grid(0).shape(), codes, Effort::kFast);
               encoded.deflated.clear();
               const auto bytes = [&](const auto& values) {
                 const auto span = std::as_bytes(std::span(values));
@@ -89,7 +89,7 @@ T value(const EncodedTile& encoded, std::size_t at) {
 }
 
 PlaneSample sample_of(const PlaneBuilder& builder, const TileShape& shape, const TileCodes& codes) {
-  const EncodedTile encoded = encode_tile(shape, codes, 1);
+  const EncodedTile encoded = encode_tile(shape, codes, Effort::kFast);
   return encoded.is_empty ? PlaneSample() : builder.sample(codes, encoded.code_min, encoded.code_max);
 }
 
@@ -185,7 +185,7 @@ TEST(PlaneBuilder, RangesAreThoseOfAllTilesBelow) {
     };
     std::map<std::tuple<int, std::int64_t, std::int64_t>, std::pair<float, float>> wanted;
     for (std::int64_t i = 0; i < grid.tile_count(); ++i) {
-      const EncodedTile encoded = encode_tile(c.shape, field.codes(grid.tile_at(i)), 1);
+      const EncodedTile encoded = encode_tile(c.shape, field.codes(grid.tile_at(i)), Effort::kFast);
       recorder.builder.add(sample_of(recorder.builder, c.shape, field.codes(grid.tile_at(i))));
       if (encoded.is_empty) continue;
       TileIndex above = grid.tile_at(i);
@@ -221,7 +221,7 @@ TEST(PlaneBuilder, GoesOnAfterAnyTileAsIfItHadNeverStoppedInMemoryAndInAScratchF
         PlaneBuilder::Stored stored;
         if (plane == 0) {
           stored.codes = field.codes(tile);
-          stored.entry = encode_tile(c.shape, stored.codes, 1);
+          stored.entry = encode_tile(c.shape, stored.codes, Effort::kFast);
           return stored;
         }
         stored.entry = whole.made.at({plane, tile.row, tile.column}).encoded;

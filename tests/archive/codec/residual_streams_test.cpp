@@ -8,7 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "isohf/archive/codec/simd/residual_expander.h"
+#include "isohf/archive/codec/residuals/bits.h"
+#include "isohf/archive/codec/residuals/residual_symbols.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/base/simd.h"
@@ -46,14 +47,15 @@ void expect_read_again(const std::vector<Zigzagged>& values) {
   CodingEffort effort = coding_effort(Effort::kDefault);
   effort.streams.has_pairs = false;
   PayloadHeader header;
-  Streams streams = make_streams(residuals, effort.streams, header);
+  const Streams streams = make_streams(residuals, effort.streams, header);
   ASSERT_EQ(streams.symbols.size(), 1U);
-  const std::size_t extra_bytes = streams.extra.size();
-  streams.extra.resize(extra_bytes + kExpanderSlack);
-  std::vector<Zigzagged> back(values.size());
-  const std::uint64_t bits =
-      expand_residuals(streams.symbols[0], std::span(streams.extra).first(extra_bytes), 0, back.data());
-  EXPECT_EQ((bits + 7) / 8, extra_bytes);
+  BitReader extra(streams.extra);
+  std::vector<Zigzagged> back;
+  for (const std::byte byte : streams.symbols[0]) {
+    const auto symbol = std::to_integer<unsigned>(byte);
+    back.push_back(static_cast<Zigzagged>(zigzagged_from(symbol, extra.take(extra_bits_of_symbol(symbol)))));
+  }
+  EXPECT_TRUE(extra.is_used_up());
   EXPECT_EQ(back, values);
 }
 

@@ -24,9 +24,9 @@ std::vector<std::byte> payload_of(const TileShape& shape, CodeType type, Kind ki
 }
 
 /// The tile, or nothing where the payload is refused.
-template <typename Decode>
-std::optional<TileCodes> decoded_by(Decode decode, const TileShape& shape, CodeType type,
-                                    std::span<const std::byte> payload) {
+using DecodeTile = TileCodes (*)(const TileShape&, CodeType, std::span<const std::byte>);
+std::optional<TileCodes> made_by(DecodeTile decode, const TileShape& shape, CodeType type,
+                                 std::span<const std::byte> payload) {
   try {
     return decode(shape, type, payload);
   } catch (const Error&) {
@@ -58,13 +58,13 @@ TEST(TileDecoder, RefusesWhatThePlainDecoderRefuses) {
       std::vector<std::byte> broken = payload_of(shape, type, kind, 2);
       for (std::size_t bit = 0; bit < 8 * broken.size(); ++bit) {
         broken[bit / 8] ^= static_cast<std::byte>(1U << bit % 8);
-        ASSERT_EQ(decoded_by(decode_tile, shape, type, broken), decoded_by(decode_tile_slowly, shape, type, broken))
+        ASSERT_EQ(made_by(decode_tile, shape, type, broken), made_by(decode_tile_slowly, shape, type, broken))
             << "bit " << bit;
         broken[bit / 8] ^= static_cast<std::byte>(1U << bit % 8);
       }
       while (!broken.empty()) {
         broken.pop_back();
-        ASSERT_FALSE(decoded_by(decode_tile, shape, type, broken).has_value()) << broken.size();
+        ASSERT_FALSE(made_by(decode_tile, shape, type, broken).has_value()) << broken.size();
       }
     }
   }
@@ -79,8 +79,8 @@ TEST(TileDecoder, SurvivesNoiseBehindAValidHeader) {
     for (std::size_t i = random() % payload.size(); i < payload.size(); ++i) {
       payload[i] = static_cast<std::byte>(random());
     }
-    ASSERT_EQ(decoded_by(decode_tile, shape, CodeType::kU16, payload),
-              decoded_by(decode_tile_slowly, shape, CodeType::kU16, payload));
+    ASSERT_EQ(made_by(decode_tile, shape, CodeType::kU16, payload),
+              made_by(decode_tile_slowly, shape, CodeType::kU16, payload));
   }
 }
 

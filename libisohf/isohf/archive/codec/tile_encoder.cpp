@@ -276,9 +276,9 @@ Deflated encode_samples(const TileShape& shape, PayloadHeader header, std::span<
     const bool is_best = request.version == PayloadVersion::kBest && shape.stored_vertex_count() >= kFewSamples;
     is_adaptive = request.version == PayloadVersion::kAdaptive || (is_best && is_coarse(lattice));
     // Where codes are coarse, twelve weights may be worth as much as eighteen.
-    const Effort effort = request.effort == Effort::kBest ? Effort::kBest : Effort::kDefault;
+    const Effort least = request.effort == Effort::kBest ? Effort::kBest : Effort::kDefault;
     if (is_adaptive || (is_best && request.effort == Effort::kBest)) {
-      coder.try_efforts(effort, [&](const CodingEffort& effort) { coder.try_adaptive(effort); });
+      coder.try_efforts(least, [&](const CodingEffort& effort) { coder.try_adaptive(effort); });
     }
   }
   if (!is_adaptive || !coder.has_any()) {

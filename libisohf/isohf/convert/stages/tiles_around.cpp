@@ -8,12 +8,6 @@
 #include "isohf/convert/stages/code_source.h"
 
 namespace isohf {
-namespace {
-
-/// Packed for the time being.
-constexpr int kLevel = 1;
-
-}  // namespace
 
 TilesAround::TilesAround(const Conversion& conversion, const RowRange& north, const RowRange& south)
     : conversion_(conversion) {
@@ -37,7 +31,7 @@ void TilesAround::make(const RowRange& rows) {
       TileCodes codes;
       made[i].is_empty = true;
       if (!source.cut(grid.tile_at(first + static_cast<std::int64_t>(i)), *part, heights, codes)) return;
-      made[i] = encode_tile(grid.shape(), codes, kLevel);
+      made[i] = encode_tile(grid.shape(), codes, Effort::kFast);
     });
     for (std::size_t i = 0; i < made.size(); ++i) tiles_[first + static_cast<std::int64_t>(i)] = std::move(made[i]);
   }
