@@ -31,7 +31,6 @@ constexpr Command kCommands[] = {
     {"export", "Write the surface as a raster of any grid, whole or cut into tiles", command_export},
     {"sample", "Print elevation and normal at places", command_sample},
     {"shade", "Draw a picture of the surface with its shadows", command_shade},
-    {"planes", "Add to an archive what it is looked at by from afar", command_planes},
     {"extract", "Cut some tiles of an archive into one of their own", command_extract},
     {"merge", "Join archives that share a lattice", command_merge},
     {"diff", "Compare two archives", command_diff},

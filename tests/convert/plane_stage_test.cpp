@@ -93,26 +93,6 @@ TEST(PlaneStage, PlanesOfEveryCodeTypeHoldWhatTheTilesBelowHold) {
   }
 }
 
-TEST(PlaneStage, PlanesThatAreAddedLaterAreTheSame) {
-  const test::TemporaryFolder folder;
-  Hills source;
-  ConvertOptions options = options_of();
-  options.shadow_seeds.emplace();
-  options.lossless = true;
-  (void)convert(source, folder / "a.isohf", options);
-  options.planes = false;
-  const ConvertSummary without = convert(source, folder / "b.isohf", options);
-  EXPECT_EQ(without.plane_bytes, 0U);
-  EXPECT_EQ(without.metadata.planes, PlaneInfo());
-  EXPECT_EQ(findings_in(folder / "b.isohf"), std::set<int>());
-  const AddPlanesSummary added = add_planes(folder / "b.isohf", folder / "b.isohf", false);
-  EXPECT_EQ(added.planes, (PlaneInfo{8, 2}));
-  EXPECT_EQ(content(folder / "b.isohf"), content(folder / "a.isohf"));
-  (void)add_planes(folder / "a.isohf", folder / "c.isohf", false);  // made anew
-  EXPECT_EQ(content(folder / "c.isohf"), content(folder / "a.isohf"));
-  EXPECT_THROW((void)add_planes(folder / "a.isohf", folder / "c.isohf", false), Error);
-}
-
 TEST(PlaneStage, VerifyFindsWhatIsNotThatOfTheTilesBelow) {
   const test::TemporaryFolder folder;
   Hills source;

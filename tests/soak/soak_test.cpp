@@ -315,14 +315,6 @@ void Soak::try_one(const std::string& path) {
     ASSERT_EQ(bytes_of(path), bytes_of(path + "2"));
     std::filesystem::remove(path + "2");
   }
-  if (chance(0.2)) {
-    (void)add_planes(path, path + "3", false);
-    ASSERT_TRUE(verify_archive(path + "3").passed());
-    if (wanted.planes) {
-      ASSERT_EQ(bytes_of(path), bytes_of(path + "3"));
-    }
-    std::filesystem::remove(path + "3");
-  }
   Surface surface(archive);
   for (int i = 0; i < 3; ++i) {
     (void)surface.at(WorldPoint{between(-0.2, 1.2) * archive.grid().world_width(),

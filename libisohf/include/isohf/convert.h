@@ -141,21 +141,6 @@ struct ConvertSummary {
 ConvertSummary convert(HeightSource& source, const std::string& output, const ConvertOptions& options = {},
                        const Job& job = {});
 
-/// What add_planes() did.
-struct AddPlanesSummary {
-  PlaneInfo planes;               ///< count 0: one tile is all, or their shape allows none
-  std::int64_t tiles = 0;         ///< of all coarse planes, stored
-  std::uint64_t plane_bytes = 0;  ///< of these, compressed
-  std::uint64_t archive_bytes = 0;
-  std::uint64_t archive_bytes_before = 0;
-};
-
-/// Writes an archive once more with the coarse planes that convert() gives it; those that it has are made anew. Members
-/// are copied as they are, each tile is decoded and none is coded again. `output` may be the archive itself. Stage
-/// "planes". Throws Error{kInvalidArgument} where `output` exists, is another file and `overwrite` is false;
-/// Error{kCorrupt} where a tile cannot be decoded or differs from the content hash.
-AddPlanesSummary add_planes(const std::string& archive, const std::string& output, bool overwrite, const Job& job = {});
-
 /// How far a surface will lie from the source's samples, by some of them.
 struct ErrorEstimate {
   double rms = 0.0;

@@ -165,9 +165,6 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(0, "formats", {"formats"});
   documents.run(0, "program", {"--version"});
   documents.run(0, "program", {"--help"});
-  documents.run(0, "convert", {"convert", coast, folder / "plain.isohf", "--no-planes"});
-  documents.run(0, "planes", {"planes", folder / "plain.isohf", "-o", folder / "planes.isohf"});
-  documents.run(2, "error", {"planes", folder / "plain.isohf", "-o", folder / "planes.isohf"});
   documents.run(0, "part", {"extract", b, "-o", folder / "one.isohf", "--tiles", "0:1,0:1"});
   documents.run(2, "error", {"extract", b, "-o", folder / "one.isohf", "--tiles", "0:1,0:1"});
   documents.run(0, "part", {"merge", b, "-o", folder / "merged.isohf"});

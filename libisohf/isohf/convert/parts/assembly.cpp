@@ -94,7 +94,7 @@ Assembly::Assembly(const Metadata& metadata, ArchiveWriter& writer, AssemblyRequ
 
 bool Assembly::decodes() const {
   const bool for_planes = request_.planes != nullptr && !request_.has_plane_rows;
-  return for_planes || request_.recount || request_.checks_digests || !request_.one_origin;
+  return for_planes || request_.recount || !request_.one_origin;
 }
 
 void Assembly::add_tiles() {
@@ -282,21 +282,6 @@ void Assembly::read(std::span<const AssemblyInput* const> inputs, TileIndex firs
             Tile& tile = lanes[places[k]];
             EncodedTile& encoded = tile.encoded;
             tile.codes = archive->read_tile(indices[k], request_.plane);
-            // Another tool's members may be stored, and their ranges are not known: only what was packed again is coded again.
-            if (archive->reads_by_directory()) {
-              const std::vector<std::byte> digest = std::move(encoded.content_digest);
-              encoded = encode_tile(metadata_.grid.shape(), tile.codes, metadata_.effort.value_or(Effort::kDefault));
-              if (!digest.empty()) encoded.content_digest = digest;
-            }
-            if (request_.checks_digests || encoded.content_digest.empty()) {
-              std::vector<std::byte> digest = tile_content_digest(tile.codes);
-              if (!encoded.content_digest.empty() && digest != encoded.content_digest) {
-                throw Error(ErrorCode::kCorrupt,
-                            fmt::format("{}: tile ({},{}) differs from its digest; see isohf verify", archive->path(),
-                                        indices[k].column, indices[k].row));
-              }
-              encoded.content_digest = std::move(digest);
-            }
             if (request_.plane != 0) set_own_range(tile.codes, metadata_.quantisation, encoded);
             if (counted_)
               encoded.statistics = tile_statistics(*counted_, indices[k], tile.codes, metadata_.quantisation);
@@ -404,7 +389,7 @@ void Assembly::compare_edges(std::int64_t row, const Row& tiles, const Row& abov
   }
 }
 
-void Assembly::add_other_members(bool everything) {
+void Assembly::add_other_members() {
   struct Found {
     const ArchiveReader* from;
     MemberEntry member;
@@ -412,19 +397,12 @@ void Assembly::add_other_members(bool everything) {
   std::vector<Found> all;
   std::map<std::string, std::size_t> places;
   for (const AssemblyInput& input : request_.inputs) {
-    if (!everything && !input.file->has_loose_members) continue;
+    if (!input.file->has_loose_members) continue;
     const ArchiveReader& archive = input.file->archive();
     std::vector<MemberEntry> members;
     for (const MemberEntry& member : archive.loose_members()) {
       const std::string& name = member.name;
-      if (!is_own_member(name) && (everything || (!name.starts_with("residual/") && name != kWholeName)))
-        members.push_back(member);
-    }
-    for (const MemberTable& table : archive.tables()) {
-      if (!everything || table.name.find("{column}") != std::string::npos) continue;
-      for (std::int64_t row = 0; row < table.rows; ++row) {
-        if (auto member = archive.find_member(member_name(table.name, row, 0))) members.push_back(*member);
-      }
+      if (!is_own_member(name) && !name.starts_with("residual/") && name != kWholeName) members.push_back(member);
     }
     std::sort(members.begin(), members.end(),
               [](const auto& a, const auto& b) { return a.offset_bytes < b.offset_bytes; });

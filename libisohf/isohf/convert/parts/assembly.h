@@ -29,7 +29,6 @@ struct AssemblyRequest {
   bool has_plane_rows = false;        ///< no: the inputs hold the first plane's tiles as they will be
   bool one_origin = true;             ///< edges meet and seeds hold wherever the inputs are joined
   bool recount = false;               ///< give the writer each tile's statistics, by counting
-  bool checks_digests = false;        ///< decode every tile and hold it against its digest
   int plane = 0;                      ///< of the inputs, whose tiles these become; another one: with `recount`
 };
 
@@ -48,9 +47,8 @@ class Assembly {
 
   /// All tiles with what belongs to them. Throws Error{kInvalidArgument} where edges don't meet.
   void add_tiles();
-  /// Members of no tile, in file order: once each by name, the last archive's. Residuals, and the whole's metadata in a
-  /// part, where `everything` is copied.
-  void add_other_members(bool everything);
+  /// Members of no tile, in file order: once each by name, the last archive's.
+  void add_other_members();
 
  private:
   struct Tile {

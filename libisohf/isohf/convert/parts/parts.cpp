@@ -119,7 +119,7 @@ void require_copyable(const ArchiveReader& archive) {
   const auto refuse = [&](const char* why) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: {}", archive.path(), why));
   };
-  if (archive.reads_by_directory()) refuse("was repacked by another tool; isohf planes puts it in order");
+  if (archive.reads_by_directory()) refuse("was repacked by another tool");
 }
 
 PartOrigin origin_of(const ArchiveReader& archive) {
@@ -227,12 +227,11 @@ PartSummary write_parts(PartsJob parts, const std::string& output, const PartOpt
                             parts.has_plane_rows,
                             parts.one_origin,
                             !parts.statistics,
-                            false,
                             parts.plane};
     Assembly assembly(metadata, writer, std::move(request), job);
     assembly.add_tiles();
     if (residuals) residuals->copy_to(writer);
-    assembly.add_other_members(false);
+    assembly.add_other_members();
   });
   if (whole && summary.is_whole && whole->content_sha256 == writer.content_hash(*whole)) {
     summary.same_as_whole = residuals || !lossless_record(*whole);
