@@ -25,17 +25,12 @@ std::string FileStamp::text() const {
 }
 
 void require_unchanged(const std::string& path, const FileStamp& opened) {
-  FileStamp now = FileStamp::of(path);
-  const bool is_planned = opened.inode == 0;
-  if (is_planned) now.device = now.inode = 0;
+  const FileStamp now = FileStamp::of(path);
   if (now == opened) return;
   const std::string sizes = now.size_bytes == opened.size_bytes
                                 ? std::string()
                                 : fmt::format(" ({} bytes, {} before)", now.size_bytes, opened.size_bytes);
-  throw Error(ErrorCode::kIo, {path,
-                               is_planned ? "is not what was planned: it was changed or replaced" + sizes
-                                          : "was changed or replaced while it was read" + sizes,
-                               "", is_planned ? "make a new plan" : "begin again"});
+  throw Error(ErrorCode::kIo, {path, "was changed or replaced while it was read" + sizes, "", "begin again"});
 }
 
 }  // namespace isohf

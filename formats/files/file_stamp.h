@@ -21,8 +21,7 @@ struct FileStamp {
   [[nodiscard]] std::string text() const;
 };
 
-/// Throws Error{kIo} where the file at `path` is not in the state any more in which it was opened. A stamp without an
-/// inode is of another machine: size and time count.
+/// Throws Error{kIo} where the file at `path` is not in the state any more in which it was opened.
 void require_unchanged(const std::string& path, const FileStamp& opened);
 
 }  // namespace isohf

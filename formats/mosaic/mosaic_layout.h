@@ -8,7 +8,7 @@
 
 #include "formats/decorate/cropped_source.h"
 #include "formats/files/file_stamp.h"
-#include "formats/mosaic/header_index.h"
+#include "formats/files/file_stamp.h"
 #include "formats/mosaic/mosaic_samples.h"
 #include "isohf/projection/reference_map.h"
 #include "isohf/raster.h"
@@ -147,10 +147,8 @@ std::int64_t overlap(std::int64_t& first, std::int64_t& begin, std::int64_t& cou
 /// box: the part that will be read; holes elsewhere do not matter.
 /// onto: the map on which files of different reference systems are joined, by bilinear interpolation; those that are in
 /// it already keep their samples, and give the grid where none is finer. Where all are in one system it is left alone.
-/// headers: where they are of these files, none is opened, and what they are is looked at where a file is read; else it
-/// is filled.
 [[nodiscard]] MosaicPlan plan_mosaic(const std::vector<std::string>& paths, const OpenOptions& options,
                                      const std::optional<BoundingBox>& box = std::nullopt,
-                                     const ProjectionRequest& onto = {}, HeaderIndex* headers = nullptr);
+                                     const ProjectionRequest& onto = {});
 
 }  // namespace isohf

@@ -416,13 +416,13 @@ class Joining {
 
 /// What the files say, read in parallel, taken up in their order: the first error is that of the first file at fault.
 std::vector<PlacedMember> survey(const std::vector<std::string>& paths, const OpenOptions& options,
-                                 const ProjectionRequest& onto, MosaicPlan& plan, HeaderIndex* headers) {
+                                 const ProjectionRequest& onto, MosaicPlan& plan) {
   struct Opened {
-    HeaderIndex::Header header;
+    SourceInfo info;
+    FileStamp stamp;
+    std::uint64_t reader_bytes = 0;
     std::exception_ptr failure;
   };
-  const bool are_known = headers != nullptr && headers->is_of(paths);
-  if (headers != nullptr && !are_known) *headers = {};
   plan.readers_at_once = oneapi::tbb::this_task_arena::max_concurrency();
   OpenOptions share = options;
   share.unpacked_bytes /= static_cast<std::uint64_t>(plan.readers_at_once);
@@ -431,26 +431,19 @@ std::vector<PlacedMember> survey(const std::vector<std::string>& paths, const Op
   for (std::size_t from = 0; from < paths.size(); from += at_once) {
     std::vector<Opened> opened(std::min(at_once, paths.size() - from));
     oneapi::tbb::parallel_for(std::size_t{0}, opened.size(), [&](std::size_t i) {
-      HeaderIndex::Header& header = opened[i].header;
       try {
-        if (are_known) {
-          header = headers->header(from + i);
-          return;
-        }
-        header.stamp = FileStamp::of(paths[from + i]);
+        opened[i].stamp = FileStamp::of(paths[from + i]);
         const std::unique_ptr<HeightSource> source = open_raster(paths[from + i], share);
-        header.info = source->info();
-        header.reader_bytes = source->buffer_bytes(UINT64_MAX);
+        opened[i].info = source->info();
+        opened[i].reader_bytes = source->buffer_bytes(UINT64_MAX);
       } catch (...) {
         opened[i].failure = std::current_exception();
       }
     });
     for (std::size_t i = 0; i < opened.size(); ++i) {
       if (opened[i].failure) std::rethrow_exception(opened[i].failure);
-      HeaderIndex::Header& header = opened[i].header;
-      if (headers != nullptr && !are_known) headers->add(paths[from + i], header);
-      plan.reader_bytes = std::max(plan.reader_bytes, header.reader_bytes);
-      found.add(paths[from + i], std::move(header.info), header.stamp);
+      plan.reader_bytes = std::max(plan.reader_bytes, opened[i].reader_bytes);
+      found.add(paths[from + i], std::move(opened[i].info), opened[i].stamp);
     }
   }
   std::vector<PlacedMember> members = found.finish();
@@ -465,11 +458,11 @@ std::vector<PlacedMember> survey(const std::vector<std::string>& paths, const Op
 }  // namespace
 
 MosaicPlan plan_mosaic(const std::vector<std::string>& paths, const OpenOptions& options,
-                       const std::optional<BoundingBox>& box, const ProjectionRequest& onto, HeaderIndex* headers) {
+                       const std::optional<BoundingBox>& box, const ProjectionRequest& onto) {
   if (paths.empty()) throw Error(ErrorCode::kInvalidArgument, "a mosaic of no files");
-  if (headers == nullptr || !headers->is_of(paths)) refuse_duplicates(paths);
+  refuse_duplicates(paths);
   MosaicPlan plan;
-  std::vector<PlacedMember> members = survey(paths, options, onto, plan, headers);
+  std::vector<PlacedMember> members = survey(paths, options, onto, plan);
   if (plan.info.georeference.unit == HorizontalUnit::kDegree && !plan.is_reprojected) join_antimeridian(members);
   place_members(std::move(members), plan);
   plan.info.path = fmt::format("mosaic of {} files", paths.size());

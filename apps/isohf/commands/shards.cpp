@@ -134,29 +134,6 @@ std::string text_of_file(const std::string& path) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// What a plan's inputs say of themselves is kept beside it, so that not every shard opens all of them.
-std::string headers_of(const std::string& plan) {
-  return plan + ".headers";
-}
-
-void read_headers(const std::string& path, const ShardPlan& plan, SourceInputs& inputs) {
-  inputs.headers = std::make_shared<HeaderIndex>();
-  std::error_code none;
-  const std::string headers = headers_of(path);
-  if (!std::filesystem::exists(headers, none)) return;
-  try {
-    *inputs.headers = HeaderIndex(text_of_file(headers), plan.job);
-  } catch (const Error& error) {
-    print_warnings({fmt::format("{}: {}; all inputs are opened instead", headers, error.what())});
-  }
-}
-
-/// Of a single input there is nothing to keep.
-void write_headers(const std::string& path, const ShardPlan& plan, const SourceInputs& inputs) {
-  if (inputs.headers && inputs.headers->size() > 0)
-    write_output(headers_of(path), inputs.headers->bytes(plan.job), true);
-}
-
 /// The plan's conversion, with what is this machine's own.
 ConvertCommandOptions conversion_of(const ShardCommand& command, const ShardPlan& plan) {
   Arguments again = plan.arguments;
@@ -169,7 +146,6 @@ ConvertCommandOptions conversion_of(const ShardCommand& command, const ShardPlan
   options->convert.strict = command.common.strict;
   options->convert.overwrite = command.overwrite;
   options->convert.resume = !command.overwrite;
-  read_headers(command.plan, plan, options->inputs);
   return std::move(*options);
 }
 
@@ -218,7 +194,6 @@ int write_plan(const Arguments& arguments) {
   std::optional<ConvertCommandOptions> options = parse_convert(arguments, ConvertLine::kPlan);
   if (!options) return kExitDone;
   check_plan_output(options->inputs.names, options->plan, options->convert.overwrite);
-  options->inputs.headers = std::make_shared<HeaderIndex>();
   const Prepared prepared = prepare(*options, expand_inputs(options->inputs.names, options->inputs.recursive));
   std::optional<ProgressDisplay> display(std::in_place, options->work.progress, options->common.quiet,
                                          options->common.verbose);
@@ -228,7 +203,6 @@ int write_plan(const Arguments& arguments) {
   display.reset();
   print_warnings(plan.warnings);
   plan.arguments = recorded(arguments);
-  write_headers(options->plan, plan, options->inputs);
   write_output(options->plan, format_shard_plan(plan), options->convert.overwrite);
   StandardOutput out;
   const std::int64_t shards = static_cast<std::int64_t>(plan.shards.size());
@@ -299,7 +273,6 @@ int command_scan(const Arguments& arguments) {
       const ShardPlan plan =
           scanned(*prepared.source, draft, scans, options.convert, job_from(command->work, *display));
       text = format_shard_plan(plan);
-      write_headers(command->output, plan, options.inputs);
     } else {
       text = scan_shard(*prepared.source, draft, command->shard, options.convert, job_from(command->work, *display));
     }

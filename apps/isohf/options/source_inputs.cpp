@@ -155,8 +155,7 @@ OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inp
   }
   const std::string name = fmt::format("mosaic of {} files", files.size());
   WorkArena arena(job.threads);
-  MosaicPlan plan =
-      arena.execute([&] { return plan_mosaic(files, options, inputs.box, inputs.onto, inputs.headers.get()); });
+  MosaicPlan plan = arena.execute([&] { return plan_mosaic(files, options, inputs.box, inputs.onto); });
   if (inputs.require_complete && plan.holes.samples > 0) {
     throw Error(ErrorCode::kIo, name + ": --require-complete: " + plan.holes.describe(MosaicHoles::kMostNamed));
   }

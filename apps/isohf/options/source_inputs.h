@@ -28,7 +28,6 @@ struct SourceInputs {
   std::optional<BoundingBox> box;           ///< of the whole, only this part
   std::optional<RecordedOptions> as_given;  ///< for the archive's metadata
   ProjectionRequest onto;                   ///< the map on which inputs of different reference systems are joined
-  std::shared_ptr<HeaderIndex> headers;     ///< plan_mosaic()'s
 };
 
 /// --bbox, and the group "Several inputs": --overlap, --require-complete, --recursive.
