@@ -34,7 +34,6 @@ constexpr Command kCommands[] = {
     {"extract", "Cut some tiles of an archive into one of their own", command_extract},
     {"merge", "Join archives that share a lattice", command_merge},
     {"diff", "Compare two archives", command_diff},
-    {"scan", "Find the range of elevations for a plan of many machines", command_scan},
     {"view", "Fly over an archive in a window, or draw it without one", command_view},
     {"formats", "List the formats that are read and written", command_formats},
 };

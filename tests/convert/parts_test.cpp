@@ -1,16 +1,15 @@
 #include "isohf/shards.h"
 
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <limits>
 
+#include "isohf/archive/attach.h"
 #include "isohf/convert.h"
 #include "isohf/error.h"
 #include "isohf/parts.h"
@@ -72,16 +71,6 @@ class Parts : public testing::Test {
   ConvertOptions options;
 };
 
-TEST_F(Parts, HaveWhatOtherToolsAdded) {
-  if (std::system("command -v zip >/dev/null 2>&1") != 0) GTEST_SKIP() << "zip is not installed";
-  const std::string whole = make("whole.isohf");
-  test::write_file(folder / "note.txt", "belongs to all of it");
-  ASSERT_EQ(std::system(fmt::format("cd {} && zip -q whole.isohf note.txt", folder / ".").c_str()), 0);
-  const std::string west = cut(whole, "w.isohf", {{0, 0}, {2, 2}});
-  EXPECT_TRUE(verify_archive(west).passed());
-  EXPECT_TRUE(ArchiveReader(west).find_member("note.txt").has_value());
-}
-
 TEST_F(Parts, ComplementaryOnesGiveTheWholesBytesInAnyOrder) {
   test::MemoryPhoto photo(210, 150, 3, [](std::int64_t c, std::int64_t r, int channel) {
     return static_cast<int>((c * 3 + r * 5 + channel * 60) % 256);
@@ -91,6 +80,8 @@ TEST_F(Parts, ComplementaryOnesGiveTheWholesBytesInAnyOrder) {
     options.texture.emplace();
     options.texture->photo = &photo;
     const std::string whole = make("whole.isohf");
+    test::write_file(folder / "note.txt", "belongs to all of it");
+    (void)attach_members(whole, {{folder / "note.txt", "note.txt"}});
     const TileGrid grid = ArchiveReader(whole).grid();
     const std::int64_t columns = grid.tile_columns();
     const std::int64_t rows = grid.tile_rows();
@@ -103,6 +94,7 @@ TEST_F(Parts, ComplementaryOnesGiveTheWholesBytesInAnyOrder) {
       EXPECT_TRUE(verify_archive(part).passed()) << part;
       const ArchiveReader reader(part);
       EXPECT_FALSE(tiles_of(reader.metadata()) == tiles_of(ArchiveReader(whole).metadata()));
+      EXPECT_TRUE(reader.find_member("note.txt").has_value());
     }
     const PartSummary joined = merge_archives({south, west, east}, folder / "joined.isohf", {.overwrite = true});
     EXPECT_TRUE(joined.is_whole);
@@ -294,12 +286,6 @@ TEST_F(Shards, OfALosslessConversionJoinToItsBytes) {
       const PartSummary joined = merge_shards(plan, files, folder / "joined.isohf", {.overwrite = true});
       EXPECT_TRUE(joined.warnings.empty());
       EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole));
-      // From a draft, by scans.
-      std::vector<NamedScan> scans;
-      const ShardPlan draft = draft_shards(source, options, 3);
-      for (int number = 1; number <= 3; ++number) scans.push_back({"scan", scan_shard(source, draft, number, options)});
-      EXPECT_EQ(format_shard_plan(scanned(source, draft, scans, options)),
-                format_shard_plan(plan_shards(source, options, 3)));
       options.lossless = false;
       EXPECT_THAT(refusal([&] { (void)convert_shard(source, plan, 1, folder / "a.isohf", options); }),
                   HasSubstr("planned was \"lossless\""));
@@ -308,52 +294,7 @@ TEST_F(Shards, OfALosslessConversionJoinToItsBytes) {
   }
 }
 
-TEST_F(Shards, ScansOfRowsMakeThePlanOfOnePass) {
-  options.z_range.reset();
-  for (const auto& [type, filter] :
-       {std::pair(CodeType::kU16, Filter::kBilinear), std::pair(CodeType::kF32, Filter::kBspline3),
-        std::pair(CodeType::kU8, Filter::kLimitedCubic)}) {
-    options.code_type = type;
-    options.filter = filter;
-    Hills source;
-    const std::string planned = format_shard_plan(plan_shards(source, options, 7));
-    const ShardPlan draft = parse_shard_plan(format_shard_plan(draft_shards(source, options, 7)));
-    EXPECT_FALSE(draft.codes.has_value());
-    EXPECT_THAT(refusal([&] { (void)convert_shard(source, draft, 1, folder / "a.isohf", options); }),
-                HasSubstr("is a draft"));
-    std::vector<NamedScan> scans;
-    for (const int number : {4, 1, 7, 2, 6, 3, 5}) {
-      scans.push_back({"scan-" + std::to_string(number), scan_shard(source, draft, number, options)});
-      EXPECT_TRUE(is_scan(scans.back().json, draft, number));
-      EXPECT_FALSE(is_scan(scans.back().json, draft, number + 1));
-    }
-    EXPECT_EQ(format_shard_plan(scanned(source, draft, scans, options)), planned);
-    scans.push_back(scans.front());
-    scans.back().name = "again";
-    scans.erase(scans.begin() + 1);
-    scans.push_back({"torn", "{}"});
-    const std::string found = refusal([&] { (void)scanned(source, draft, scans, options); });
-    EXPECT_THAT(found, HasSubstr("again: is scan 4, as scan-4 is"));
-    EXPECT_THAT(found, HasSubstr("torn: scan: format: is missing"));
-    EXPECT_THAT(found, HasSubstr("these scans are missing: 1"));
-  }
-  // A range that is given is the plan's, whatever scans find.
-  options.code_type = CodeType::kU16;
-  options.z_range = {100.0, 900.0};
-  Hills given;
-  const ShardPlan ranged = draft_shards(given, options, 1);
-  EXPECT_EQ(format_shard_plan(scanned(given, ranged, {{"one", scan_shard(given, ranged, 1, options)}}, options)),
-            format_shard_plan(plan_shards(given, options, 1)));
-  options.z_range.reset();
-  // What only the surface can tell.
-  options.code_type = CodeType::kU16;
-  options.filter = Filter::kBspline3;
-  Hills source;
-  const ShardPlan draft = draft_shards(source, options, 1);
-  EXPECT_THAT(refusal([&] {
-                (void)scanned(source, draft, {{"one", scan_shard(source, draft, 1, options)}}, options);
-              }),
-              HasSubstr("can leave the range of the samples"));
+TEST(ShardList, JoinsNumbersThatFollowEachOther) {
   EXPECT_EQ(shard_list({1, 3, 4, 5, 9}), "1,3-5,9");
 }
 
@@ -400,7 +341,7 @@ TEST_F(Shards, AreRefusedWhereTheyAreNotWhatWasPlanned) {
   const auto merged = [&](const std::vector<std::string>& parts) {
     return refusal([&] { (void)merge_shards(plan, parts, folder / "refused.isohf"); });
   };
-  options.effort = Effort::kFast;
+  options.level = 2;
   EXPECT_THAT(refusal([&] { (void)convert_shard(source, plan, 1, folder / "a.isohf", options); }),
               HasSubstr("are not those that were planned: \"level 2\", planned was \"level"));
   EXPECT_THAT(refusal([&] { (void)convert_shard(source, plan, 4, folder / "a.isohf", options); }),
@@ -449,7 +390,7 @@ TEST(TileRange, MeetsAndIsPutAround) {
 
 TEST_F(Parts, DiffDecodesNothingAndListsMetadata) {
   const std::string whole = make("whole.isohf");
-  options.effort = Effort::kFast;
+  options.level = 3;
   const std::string other = make("other.isohf");
   const ArchiveDifference difference = diff_archives(whole, other);
   EXPECT_TRUE(difference.same_tiles());

@@ -16,7 +16,6 @@ int command_merge(const Arguments& arguments);
 int command_plan(const Arguments& arguments);
 int command_restore(const Arguments& arguments);
 int command_sample(const Arguments& arguments);
-int command_scan(const Arguments& arguments);
 int command_shade(const Arguments& arguments);
 int command_verify(const Arguments& arguments);
 int command_view(const Arguments& arguments);

@@ -79,16 +79,12 @@ std::optional<PlanOptions> parse_plan(const Arguments& arguments) {
               "Write a plan for isohf convert --plan, and isohf merge; takes all options of isohf convert",
               [](const std::string&) {});
   line.option("--shards", "N", "With --write: cut the work into N shards", [](const std::string&) {});
-  bool no_scan = false;
-  line.flag("--no-scan", "With --write: leave the range of elevations to isohf scan, on many machines", no_scan);
   add_common_options(line, options.common);
   line.footer(kPlanFooter);
   if (!line.parse(arguments)) return std::nullopt;
   options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, "plan: " + why); };
-  for (const char* option : {"--shards", "--no-scan"}) {
-    if (line.given(option)) refuse(std::string(option) + " needs --write FILE");
-  }
+  if (line.given("--shards")) refuse("--shards needs --write FILE");
   if (options.inputs.names.empty()) {
     const std::string option = line.first_given({"Lattice", "Ground", "Input", "Several inputs"});
     if (!option.empty()) refuse(option + " needs an INPUT");

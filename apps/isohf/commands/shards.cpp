@@ -47,7 +47,7 @@ std::vector<std::string> recorded(const Arguments& arguments) {
       break;
     }
     // What one machine prints is its own business.
-    constexpr std::array kDropped = {"--overwrite", "--no-scan", "-q", "--quiet", "--json"};
+    constexpr std::array kDropped = {"--overwrite", "-q", "--quiet", "--json"};
     if (std::find(kDropped.begin(), kDropped.end(), argument) != kDropped.end()) continue;
     if (argument == "--write" || argument == "--shards") {
       ++i;
@@ -58,15 +58,6 @@ std::vector<std::string> recorded(const Arguments& arguments) {
   return kept;
 }
 
-constexpr const char* kScanFooter =
-    R"(Where one machine takes long to read all of the input for the range of its elevations, many do: plan --no-scan writes a
-draft, each shard's rows are scanned, and all scans together make the plan. With --z-range no scan is needed.
-
-Examples:
-  isohf plan tiles/ --write draft.plan --shards 16 --no-scan
-  isohf scan --plan draft.plan --shard 3/16 -o scan-3.json
-  isohf scan --plan draft.plan scan-*.json -o land.plan)";
-
 struct ShardCommand {
   CommonOptions common;
   WorkOptions work;
@@ -74,18 +65,14 @@ struct ShardCommand {
   int shard = 0;
   int shards = 0;
   std::string output;
-  std::vector<std::string> scans;  ///< of isohf scan: they make the plan
   bool overwrite = false;
 };
 
-std::optional<ShardCommand> parse_shards(const Arguments& arguments, bool scans) {
+std::optional<ShardCommand> parse_shard(const Arguments& arguments) {
   ShardCommand options;
-  CommandLine line(scans ? "scan" : "convert", scans ? "Finds the range of elevations for a plan, on many machines."
-                                                     : "Makes one shard of a plan: some rows of tiles of its archive.");
+  CommandLine line("convert", "Makes one shard of a plan: some rows of tiles of its archive.");
   line.group("Arguments");
-  if (scans) line.positionals("[SCAN...]", "Scans of all shards, which make the draft a plan", options.scans);
-  line.option("--plan", "PLAN", scans ? "Draft of isohf plan --write --no-scan" : "Plan of isohf plan --write",
-              options.plan);
+  line.option("--plan", "PLAN", "Plan of isohf plan --write", options.plan);
   line.option("--shard", "K/N", "The Kth of the plan's N shards, from 1 on", [&](const std::string& text) {
     const std::size_t slash = text.find('/');
     if (slash == std::string::npos) {
@@ -94,20 +81,17 @@ std::optional<ShardCommand> parse_shards(const Arguments& arguments, bool scans)
     options.shard = static_cast<int>(parse_whole_number(text.substr(0, slash), 1, 1000000));
     options.shards = static_cast<int>(parse_whole_number(text.substr(slash + 1), 1, 1000000));
   });
-  const char* const output = scans ? "OUTPUT" : "PART";
-  line.option("-o,--output", output, scans ? "The scan to write, or the plan" : "The archive to write", options.output);
+  line.option("-o,--output", "PART", "The archive to write", options.output);
   line.flag("--overwrite", "Make it anew where it exists", options.overwrite);
   add_work_options(line, options.work);
   add_memory_options(line, "that of -o", options.work);
   add_common_options(line, options.common);
-  line.footer(scans ? kScanFooter : kShardFooter);
+  line.footer(kShardFooter);
   line.settled("convert", "is settled by the plan; isohf plan takes it");
   if (!line.parse(arguments)) return std::nullopt;
   line.require("PLAN (--plan)", options.plan);
-  line.require(fmt::format("{} (-o)", output), options.output);
-  if (options.shard == 0 && options.scans.empty())
-    line.fail(scans ? "which shard? Give --shard K/N, or all scans" : "which shard? Give --shard K/N");
-  if (options.shard != 0 && !options.scans.empty()) line.fail("give --shard K/N or all scans, not both");
+  line.require("PART (-o)", options.output);
+  if (options.shard == 0) line.fail("which shard? Give --shard K/N");
   return options;
 }
 
@@ -115,20 +99,18 @@ std::optional<ShardCommand> parse_shards(const Arguments& arguments, bool scans)
 ShardPlan read_plan_of(const ShardCommand& options) {
   ShardPlan plan = read_plan(options.plan);
   const int count = static_cast<int>(plan.shards.size());
-  if (options.shard != 0 && (options.shards != count || options.shard > count)) {
+  if (options.shards != count || options.shard > count) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("--shard {}/{}: {} has shards 1/{} to {}/{}", options.shard,
                                                          options.shards, options.plan, count, count, count));
   }
   return plan;
 }
 
-/// A plan or a scan.
 std::string text_of_file(const std::string& path) {
   constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20U;
   const auto file = open_file_source(path);
   if (file->size_bytes() > kMostBytes) {
-    throw Error(ErrorCode::kCorrupt,
-                fmt::format("{}: is neither plan nor scan: it has {} bytes", path, file->size_bytes()));
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: is no plan: it has {} bytes", path, file->size_bytes()));
   }
   const std::vector<std::byte> bytes = SourceBytes(*file, 0, file->size_bytes()).take();
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -197,9 +179,7 @@ int write_plan(const Arguments& arguments) {
   const Prepared prepared = prepare(*options, expand_inputs(options->inputs.names, options->inputs.recursive));
   std::optional<ProgressDisplay> display(std::in_place, options->work.progress, options->common.quiet,
                                          options->common.verbose);
-  ShardPlan plan = options->draft ? draft_shards(*prepared.source, options->convert, options->shards)
-                                  : plan_shards(*prepared.source, options->convert, options->shards,
-                                                job_from(options->work, *display));
+  ShardPlan plan = plan_shards(*prepared.source, options->convert, options->shards, job_from(options->work, *display));
   display.reset();
   print_warnings(plan.warnings);
   plan.arguments = recorded(arguments);
@@ -221,7 +201,7 @@ int write_plan(const Arguments& arguments) {
 }
 
 int convert_shard_of(const Arguments& arguments) {
-  const auto command = parse_shards(arguments, false);
+  const auto command = parse_shard(arguments);
   if (!command) return kExitDone;
   const ShardPlan plan = read_plan_of(*command);
   if (!command->overwrite && is_shard(command->output, plan, command->shard)) {
@@ -245,53 +225,6 @@ int convert_shard_of(const Arguments& arguments) {
   display.reset();
   print_warnings(summary.warnings);
   print_shard(*command, "done", &summary);
-  return kExitDone;
-}
-
-int command_scan(const Arguments& arguments) {
-  const auto command = parse_shards(arguments, true);
-  if (!command) return kExitDone;
-  const ShardPlan draft = read_plan_of(*command);
-  std::error_code none;
-  const bool exists = std::filesystem::exists(command->output, none);
-  const bool makes_plan = !command->scans.empty();
-  const bool is_done =
-      exists && !makes_plan && !command->overwrite && is_scan(text_of_file(command->output), draft, command->shard);
-  if (!is_done) {
-    ConvertCommandOptions options = conversion_of(*command, draft);
-    std::vector<std::string> read = options.inputs.names;
-    read.insert(read.end(), command->scans.begin(), command->scans.end());
-    read.push_back(command->plan);
-    check_plan_output(read, command->output, command->overwrite);
-    const Prepared prepared = prepare(options, expand_inputs(options.inputs.names, options.inputs.recursive));
-    std::optional<ProgressDisplay> display(std::in_place, command->work.progress, command->common.quiet,
-                                           command->common.verbose);
-    std::string text;
-    if (makes_plan) {
-      std::vector<NamedScan> scans;
-      for (const std::string& file : command->scans) scans.push_back({file, text_of_file(file)});
-      const ShardPlan plan =
-          scanned(*prepared.source, draft, scans, options.convert, job_from(command->work, *display));
-      text = format_shard_plan(plan);
-    } else {
-      text = scan_shard(*prepared.source, draft, command->shard, options.convert, job_from(command->work, *display));
-    }
-    display.reset();
-    write_output(command->output, text, command->overwrite);
-  }
-  StandardOutput out;
-  const char* const status = is_done ? "done already" : "done";
-  if (command->common.json) {
-    ordered_json document = {
-        {"plan", command->plan}, {"shards", draft.shards.size()}, {"output", command->output}, {"status", status}};
-    if (!makes_plan) document["shard"] = command->shard;
-    out.write(json_text(document));
-  } else if (!command->common.quiet) {
-    out.write(makes_plan
-                  ? fmt::format("{:<12} {}: {} scans\n", "plan", command->output, command->scans.size())
-                  : fmt::format("scan {}/{} {}: {}\n", command->shard, command->shards, status, command->output));
-  }
-  out.finish();
   return kExitDone;
 }
 

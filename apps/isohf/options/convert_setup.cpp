@@ -122,7 +122,6 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments, C
     line.option("--shards", "N", "Cut the work into N shards", [&](const std::string& text) {
       options.shards = static_cast<int>(parse_whole_number(text, 1, 1000000));
     });
-    line.flag("--no-scan", "Leave the range of elevations to isohf scan, on many machines", options.draft);
     line.flag("--overwrite", "Replace FILE where it exists", options.convert.overwrite);
     line.repeated("-i,--input", "INPUT", "An input, before those without a name; may be given again",
                   options.inputs.names);

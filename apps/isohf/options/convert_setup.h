@@ -32,7 +32,6 @@ struct ConvertCommandOptions {
   bool dry_run = false;
   int shards = 1;  ///< of plan --write
   std::string plan;
-  bool draft = false;  ///< of a plan: leave out the look at the samples
   EachOptions each;
   /// Measure the archive against the input; the file for the report, "-" for none beside the summary.
   std::optional<std::string> report;

@@ -23,14 +23,14 @@ struct ShardPlan {
   std::string job;                     ///< sources, lattice, options, program: equal text, equal bytes
   std::int64_t tile_columns = 0;
   std::int64_t tile_rows = 0;
-  /// By the range of elevations; nullopt in a draft, which has yet to be scanned.
+  /// By the range of elevations.
   struct Codes {
     Quantisation quantisation;
     double datum = 0.0;         ///< that heights are computed from
     double height_error = 0.0;  ///< of such heights, at most
     double largest = 0.0;       ///< no elevation is meant to lie further from 0
   };
-  std::optional<Codes> codes;
+  Codes codes;
   std::optional<std::string> samples_sha256;                  ///< of all samples, for `lossless`
   std::vector<std::pair<std::int64_t, std::int64_t>> shards;  ///< rows of tiles: first, and past the last
   std::vector<Warning> warnings;  ///< of the pass over the source, where there was one; no part of what is written
@@ -42,24 +42,6 @@ struct ShardPlan {
 /// Error{kInvalidArgument} for `max_error` and `measure`, which need all rows at once.
 [[nodiscard]] ShardPlan plan_shards(HeightSource& source, const ConvertOptions& options, int shards,
                                     const Job& job = {});
-/// The same without a look at any sample. What one machine takes long to read many can: scan_shard() and scanned().
-[[nodiscard]] ShardPlan draft_shards(const HeightSource& source, const ConvertOptions& options, int shards);
-/// Looks at as many of the source's rows as fall to one shard, and gives what scanned() takes, JSON.
-[[nodiscard]] std::string scan_shard(HeightSource& source, const ShardPlan& draft, int number,
-                                     const ConvertOptions& options, const Job& job = {});
-/// Whether a text is what scan_shard() gives for that shard of the draft.
-[[nodiscard]] bool is_scan(const std::string& json, const ShardPlan& draft, int number);
-/// Of a file, or wherever it comes from.
-struct NamedScan {
-  std::string name;  ///< for messages
-  std::string json;  ///< as scan_shard() gave it
-};
-/// The plan of a draft whose shards were all scanned: the one of plan_shards(), also with the pass for the hash. Throws Error{kInvalidArgument} naming
-/// scans that are missing, there twice or of another draft, and where the filter can leave the samples' range so that
-/// the surface has to be looked at: then `z_range` helps, or plan_shards().
-[[nodiscard]] ShardPlan scanned(HeightSource& source, const ShardPlan& draft, const std::vector<NamedScan>& scans,
-                                const ConvertOptions& options, const Job& job = {});
-
 /// A plan as JSON, and back. parse_shard_plan() throws Error{kCorrupt} naming the member at fault, Error{kUnsupported}
 /// for other versions than 2.
 [[nodiscard]] std::string format_shard_plan(const ShardPlan& plan);

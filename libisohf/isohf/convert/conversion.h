@@ -39,19 +39,6 @@ struct Conversion {
   }
 };
 
-/// What the first pass finds in some rows of the source, elevations; counts and ranges of all rows follow from the parts'.
-struct RangeScan {
-  SourceScan samples;
-  ElevationRange edges{HUGE_VAL, -HUGE_VAL};  ///< what EdgeRange bounds
-
-  void add(const RangeScan& other);
-};
-/// rows  of the source; the first pass looks at all at once. What is odd goes to `warnings`.
-[[nodiscard]] RangeScan scan_range(const Conversion& conversion, const RowRange& rows, std::vector<Warning>& warnings);
-/// Codes by a scan of all rows. False where the surface itself must be looked at, because the filter leaves the samples'
-/// range; `may_cut` says that this may be done, and then it always is true.
-[[nodiscard]] bool choose_codes_by(Conversion& conversion, const RangeScan& scan, bool may_cut);
-
 /// The first pass over the source, where one is needed, and what follows from it: datum, scale and offset.
 void choose_codes(Conversion& conversion, ConvertSummary& summary);
 

@@ -312,12 +312,8 @@ Plan plan_conversion(const SourceInfo& info, const ConvertOptions& options) {
   return make_plan(info, options.plan);
 }
 
-namespace {
-
-/// The codes of a conversion that writes nothing, after `look`.
-template <typename Look>
-ShardPlan::Codes before_writing(HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job,
-                                Look look) {
+ShardPlan::Codes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job,
+                            std::vector<Warning>& warnings) {
   if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
   const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));
   const MemoryPlan memory = plan_memory(source, plan, options, job, 0);
@@ -325,46 +321,11 @@ ShardPlan::Codes before_writing(HeightSource& source, const Plan& plan, const Co
   source.limit_buffers(memory.source_buffer_bytes);
   Conversion conversion{source, options, plan, memory, kernel, Prefilter::make(kernel.filter(), options.acquisition),
                         job};
-  Arena(job).execute([&] { look(conversion); });
-  return {conversion.quantisation, conversion.datum, conversion.height_error, conversion.largest};
-}
-
-}  // namespace
-
-ShardPlan::Codes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job,
-                            std::vector<Warning>& warnings) {
   ConvertSummary summary(plan.grid);
-  const ShardPlan::Codes codes =
-      before_writing(source, plan, options, job, [&](Conversion& conversion) { choose_codes(conversion, summary); });
+  Arena(job).execute([&] { choose_codes(conversion, summary); });
   refuse_warnings(summary, options);
   warnings = std::move(summary.warnings);
-  return codes;
-}
-
-RangeScan find_range(HeightSource& source, const Plan& plan, const ConvertOptions& options, const RowRange& rows,
-                     const Job& job) {
-  RangeScan found;
-  std::vector<Warning> warnings;
-  (void)before_writing(source, plan, options, job,
-                       [&](Conversion& conversion) { found = scan_range(conversion, rows, warnings); });
-  if (options.strict && !warnings.empty()) throw error_from(warnings);
-  return found;
-}
-
-ShardPlan::Codes codes_of(HeightSource& source, const Plan& plan, const ConvertOptions& options,
-                          const RangeScan& scan) {
-  return before_writing(source, plan, options, {}, [&](Conversion& conversion) {
-    if (options.z_range) {  // says it all
-      ConvertSummary unused(plan.grid);
-      return choose_codes(conversion, unused);
-    }
-    if (choose_codes_by(conversion, scan, false)) return;
-    throw Error(
-        ErrorCode::kInvalidArgument,
-        fmt::format("{}: the surface that {} makes can leave the range of the samples, which scans do not tell; "
-                    "give `z_range`, or plan without a draft",
-                    source.info().path, to_string(conversion.kernel.filter())));
-  });
+  return {conversion.quantisation, conversion.datum, conversion.height_error, conversion.largest};
 }
 
 ConversionResult run_conversion(HeightSource& source, const Plan& plan, const std::string& output,

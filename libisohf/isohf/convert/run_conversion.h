@@ -35,13 +35,6 @@ struct ShardWork {
 /// Codes alone: the first pass over the source, where one is needed. `plan` must be made of options.plan.
 [[nodiscard]] ShardPlan::Codes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options,
                                           const Job& job, std::vector<Warning>& warnings);
-/// That pass over some rows, and codes by what it found in all of them. Throws Error{kInvalidArgument} where these must be
-/// found by the surface itself.
-[[nodiscard]] RangeScan find_range(HeightSource& source, const Plan& plan, const ConvertOptions& options,
-                                   const RowRange& rows, const Job& job);
-[[nodiscard]] ShardPlan::Codes codes_of(HeightSource& source, const Plan& plan, const ConvertOptions& options,
-                                        const RangeScan& scan);
-
 /// One conversion, by a plan that was made of options.plan. `is_retry`: an interrupt leaves no part file behind, which
 /// `resume` could not use.
 [[nodiscard]] ConversionResult run_conversion(HeightSource& source, const Plan& plan, const std::string& output,

@@ -1,4 +1,4 @@
-/// `plan --write`, `convert --plan`, `scan`, `merge` and `extract` as a user meets them: what is refused, and how.
+/// `plan --write`, `convert --plan`, `merge` and `extract` as a user meets them: what is refused, and how.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -94,10 +94,8 @@ TEST_F(ShardsCommand, AreRefusedByNumberPlanAndSource) {
   expect_refused({"convert", "--plan", "land.plan", "--shard", "0/3", "-o", "a.isohf"}, 2, "--shard");
   expect_refused({"convert", "--plan", "land.plan", "--shard", "one", "-o", "a.isohf"}, 2, "must be K/N, as in 3/16");
   expect_refused({"convert", "--plan", "land.plan", "-o", "a.isohf"}, 2, "which shard? Give --shard K/N");
-  for (const char* command : {"convert", "scan"}) {
-    expect_refused({command, "--plan", "land.plan", "--shard", "1/3", "-o", "a.isohf", "--effort", "best"}, 2,
-                   "--effort is settled by the plan; isohf plan takes it");
-  }
+  expect_refused({"convert", "--plan", "land.plan", "--shard", "1/3", "-o", "a.isohf", "--level", "9"}, 2,
+                 "--level is settled by the plan; isohf plan takes it");
   expect_refused({"convert", "--plan", "none.plan", "--shard", "1/3", "-o", "a.isohf"}, 1, "none.plan: ");
   expect_refused({"convert", "--plan", "land.tif", "--shard", "1/3", "-o", "a.isohf"}, 1,
                  "land.tif: is no plan of a conversion");
@@ -142,20 +140,6 @@ TEST_F(ShardsCommand, AreJoinedOnlyWithTheirOwnAndNothingIsLost) {
   EXPECT_THAT(damaged.err, AllOf(HasSubstr("p-2.isohf: "), HasSubstr("p-3.isohf: "), HasSubstr("missing: 2-3")));
   EXPECT_EQ(read_file(folder / "a.isohf"), kept);
   EXPECT_FALSE(fs::exists(folder / "a.isohf.part"));
-}
-
-TEST_F(ShardsCommand, AreScannedAndTheirScansMakeThePlan) {
-  plan("draft.plan", {"--shadow-seeds", "--no-scan"});
-  for (const char* k : {"1", "2", "3"}) {
-    EXPECT_EQ(
-        run({"scan", "--plan", "draft.plan", "--shard", std::string(k) + "/3", "-o", std::string("s-") + k}).exit_code,
-        0);
-  }
-  expect_refused({"convert", "--plan", "draft.plan", "--shard", "1/3", "-o", "a.isohf"}, 2, "is a draft");
-  expect_refused({"scan", "--plan", "draft.plan", "s-1", "s-3", "-o", "made.plan"}, 2, "these scans are missing: 2");
-  expect_refused({"scan", "--plan", "draft.plan", "s-1", "s-2", "s-3", "-o", "s-1"}, 2, "s-1: ");
-  EXPECT_EQ(run({"scan", "--plan", "draft.plan", "s-1", "s-2", "s-3", "-o", "made.plan"}).exit_code, 0);
-  EXPECT_EQ(read_file(folder / "made.plan"), read_file(folder / "land.plan"));
 }
 
 /// Four files of one degree each, of 40x40 samples.

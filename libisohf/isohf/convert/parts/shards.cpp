@@ -42,7 +42,7 @@ void plan_members(JsonMembers& json, ShardPlan& plan) {
   }
   json.all("arguments", plan.arguments, "job", plan.job);
   json.object("tiles", "columns", plan.tile_columns, "rows", plan.tile_rows);
-  json.object("codes", plan.codes, codes_members, {.presence = JsonRule::kAbsent});
+  json.object("codes", plan.codes, codes_members);
   json("samples_sha256", plan.samples_sha256, {.presence = JsonRule::kAbsent});
   // The rows that shards end before.
   std::vector<double> ends;
@@ -95,7 +95,7 @@ Plan planned(const HeightSource& source, const ShardPlan& plan, int number, cons
   if (parse_shard_plan(format_shard_plan(plan)).shards != plan.shards)
     throw Error(ErrorCode::kInvalidArgument,
                 "plan: its shards do not follow each other from the first row of tiles on");
-  if (plan.codes) require_known("plan: its codes' type", plan.codes->quantisation.type, CodeType::kF32);
+  require_known("plan: its codes' type", plan.codes.quantisation.type, CodeType::kF32);
   const int count = static_cast<int>(plan.shards.size());
   if (number < 1 || number > count) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("there is no shard {}: the plan has 1 to {}", number, count));
@@ -115,32 +115,9 @@ Plan planned(const HeightSource& source, const ShardPlan& plan, int number, cons
                     source.info().path, around(found, at.first - found.begin()),
                     around(plan.job, at.second - plan.job.begin())));
   }
-  if (plan.codes && options.lossless && !plan.samples_sha256)
+  if (options.lossless && !plan.samples_sha256)
     throw Error(ErrorCode::kCorrupt, "plan: samples_sha256: is missing, of a lossless conversion");
   return whole;
-}
-
-/// What one scan found, and of which draft.
-struct ShardScan {
-  std::string plan;
-  int number = 0;
-  int shards = 0;
-  RangeScan found;
-};
-
-void scan_members(JsonMembers& json, ShardScan& scan) {
-  std::string format = "isohf-scan";
-  json.all("format", format, "plan_sha256", scan.plan, "number", scan.number, "of", scan.shards);
-  if (format != "isohf-scan") json.refuse("format", fmt::format("is \"{}\", must be \"isohf-scan\"", format));
-  json.all("valid", scan.found.samples.valid, "voids", scan.found.samples.voids);
-  const auto range = [&](const char* key, ElevationRange& of) {
-    std::vector<double> ends = {of.min, of.max};
-    json(key, ends);
-    if (ends.size() != 2) json.refuse(key, "has not two ends");
-    of = {ends[0], ends[1]};
-  };
-  range("range", scan.found.samples.range);
-  range("edges", scan.found.edges);
 }
 
 /// Reads what formatted() wrote. The table of members serves metadata, of which none is here.
@@ -214,13 +191,6 @@ bool holds_plane_rows(const ShardPlan& plan, const PlaneInfo& planes) {
 }  // namespace
 
 ShardPlan plan_shards(HeightSource& source, const ConvertOptions& options, int shards, const Job& job) {
-  ShardPlan plan = draft_shards(source, options, shards);
-  plan.codes = find_codes(source, plan_conversion(source.info(), options), options, job, plan.warnings);
-  if (options.lossless) plan.samples_sha256 = hash_of_samples(source.as_stored(), job);
-  return plan;
-}
-
-ShardPlan draft_shards(const HeightSource& source, const ConvertOptions& options, int shards) {
   refuse_what_needs_all(options);
   if (shards < 1) throw Error(ErrorCode::kInvalidArgument, fmt::format("{} shards are asked for, at least 1", shards));
   const Plan plan = plan_conversion(source.info(), options);
@@ -236,6 +206,8 @@ ShardPlan draft_shards(const HeightSource& source, const ConvertOptions& options
   for (std::int64_t k = 0; k < count; ++k) {
     found.shards.emplace_back(units * k / count * unit, std::min(units * (k + 1) / count * unit, found.tile_rows));
   }
+  found.codes = find_codes(source, plan, options, job, found.warnings);
+  if (options.lossless) found.samples_sha256 = hash_of_samples(source.as_stored(), job);
   return found;
 }
 
@@ -247,76 +219,14 @@ ShardPlan parse_shard_plan(const std::string& json) {
   return parsed(json, plan_members, "plan");
 }
 
-std::string scan_shard(HeightSource& source, const ShardPlan& draft, int number, const ConvertOptions& options,
-                       const Job& job) {
-  const Plan plan = planned(source, draft, number, options);
-  const auto count = static_cast<std::int64_t>(draft.shards.size());
-  const std::int64_t height = source.info().height;
-  if (count > height) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("{} shards are to scan {} rows of samples", count, height));
-  }
-  const RowRange rows{height * (number - 1) / count, height * number / count - 1};
-  const RangeScan found = find_range(source, plan, options, rows, job);
-  return formatted(ShardScan{digest_of(draft), number, static_cast<int>(count), found}, scan_members);
-}
-
-bool is_scan(const std::string& json, const ShardPlan& draft, int number) {
-  try {
-    const auto scan = parsed(json, scan_members, "scan");
-    return scan.plan == digest_of(draft) && scan.number == number;
-  } catch (const Error&) {
-    return false;
-  }
-}
-
-ShardPlan scanned(HeightSource& source, const ShardPlan& draft, const std::vector<NamedScan>& scans,
-                  const ConvertOptions& options, const Job& job) {
-  const Plan plan = planned(source, draft, 1, options);
-  const std::string digest = digest_of(draft);
-  std::vector<std::optional<RangeScan>> found(draft.shards.size());
-  std::vector<const NamedScan*> files(draft.shards.size());
-  Problems problems;
-  for (const NamedScan& file : scans) {
-    ShardScan scan;
-    try {
-      scan = parsed(file.json, scan_members, "scan");
-    } catch (const Error& error) {
-      problems.add(error.within(file.name));
-      continue;
-    }
-    if (scan.plan != digest || scan.number < 1 || scan.number > static_cast<int>(found.size())) {
-      problems.add(fmt::format("{}: is a scan of another plan", file.name));
-      continue;
-    }
-    const auto place = static_cast<std::size_t>(scan.number - 1);
-    if (files[place] != nullptr)
-      problems.add(fmt::format("{}: is scan {}, as {} is", file.name, scan.number, files[place]->name));
-    files[place] = &file;
-    found[place] = scan.found;
-  }
-  RangeScan all;
-  std::vector<int> missing;
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    if (!found[i]) missing.push_back(static_cast<int>(i) + 1);
-    if (found[i]) all.add(*found[i]);
-  }
-  if (!missing.empty()) problems.add("these scans are missing: " + shard_list(missing));
-  problems.throw_if_any();
-  ShardPlan result = draft;
-  result.codes = codes_of(source, plan, options, all);
-  if (options.lossless) result.samples_sha256 = hash_of_samples(source.as_stored(), job);
-  return result;
-}
-
 ConvertSummary convert_shard(HeightSource& source, const ShardPlan& plan, int number, const std::string& output,
                              const ConvertOptions& options, const Job& job) {
-  if (!plan.codes) throw Error(ErrorCode::kInvalidArgument, "the plan is a draft: its shards are to be scanned first");
   const Plan whole = planned(source, plan, number, options);
   const int count = static_cast<int>(plan.shards.size());
   const auto [first, end] = plan.shards[static_cast<std::size_t>(number - 1)];
   const ShardWork work{first,
                        end,
-                       *plan.codes,
+                       plan.codes,
                        {digest_of(plan), number, count, {}},
                        plan.samples_sha256,
                        holds_plane_rows(plan, options.planes ? planes_for(whole.grid) : PlaneInfo())};

@@ -35,21 +35,15 @@ SourceSurvey survey_window(const SourceInfo& info, std::span<const std::byte> ra
       });
 }
 
-/// First pass: range and counts of some rows of the source. While one window is looked at the next one is read.
-SourceSurvey survey_source(const Conversion& conversion, const RowRange& rows, EdgeRange& edge) {
+/// First pass: range and counts of the source. While one window is looked at the next one is read.
+SourceSurvey survey_source(const Conversion& conversion, EdgeRange& edge) {
   HeightSource& source = conversion.source;
   const SourceInfo& info = source.info();
   const ReadStep& step = conversion.memory.scan_step;
   SourceSurvey survey(info, false);
   std::vector<std::byte> now;
   std::vector<std::byte> next;
-  const std::int64_t end = rows.last + 1;
-  const auto windows_at = [&](std::int64_t row) {
-    std::vector<Window> band = step.windows(info, row);
-    for (Window& window : band) window.rows = std::min(window.rows, end - window.row);
-    return band;
-  };
-  std::vector<Window> windows = windows_at(rows.first);
+  std::vector<Window> windows = step.windows(info, 0);
   const auto read = [&](const Window& window, std::vector<std::byte>& raw) {
     raw.resize(static_cast<std::size_t>(window.columns * window.rows) * size_bytes(info.sample_type));
     source.read_window(window, raw);
@@ -58,8 +52,8 @@ SourceSurvey survey_source(const Conversion& conversion, const RowRange& rows, E
   for (std::size_t i = 0; i < windows.size();) {
     conversion.job.throw_if_cancelled();
     const Window window = windows[i++];
-    if (i == windows.size() && window.row + window.rows < end) {
-      windows = windows_at(window.row + window.rows);
+    if (i == windows.size() && window.row + window.rows < info.height) {
+      windows = step.windows(info, window.row + window.rows);
       i = 0;
     }
     const auto look = [&] {
@@ -73,7 +67,7 @@ SourceSurvey survey_source(const Conversion& conversion, const RowRange& rows, E
     }
     now.swap(next);
     const std::int64_t done = window.row + (i == 0 || i == windows.size() ? window.rows : 0);
-    conversion.job.report({"range", "rows", done - rows.first, end - rows.first});
+    conversion.job.report({"range", "rows", done, info.height});
   }
   return survey;
 }
@@ -150,79 +144,43 @@ QuantisationRequest request_of(Conversion& conversion, const ElevationRange& ran
 
 }  // namespace
 
-void RangeScan::add(const RangeScan& other) {
-  if (samples.valid == 0) samples.range = other.samples.range;
-  if (other.samples.valid > 0) {
-    samples.range.min = std::min(samples.range.min, other.samples.range.min);
-    samples.range.max = std::max(samples.range.max, other.samples.range.max);
-  }
-  samples.valid += other.samples.valid;
-  samples.voids += other.samples.voids;
-  edges = {std::min(edges.min, other.edges.min), std::max(edges.max, other.edges.max)};
-}
-
-RangeScan scan_range(const Conversion& conversion, const RowRange& rows, std::vector<Warning>& warnings) {
+void choose_codes(Conversion& conversion, ConvertSummary& summary) {
   const SourceInfo& info = conversion.source.info();
+  if (conversion.options.z_range) {
+    const ElevationRange range{conversion.options.z_range->first, conversion.options.z_range->second};
+    conversion.quantisation = quantisation_of_range(request_of(conversion, range), range, info);
+    conversion.limits = {range.min, range.max};
+    return;
+  }
   const SourceAxes axes = make_axes(conversion.plan.grid, conversion.geometry());
-  const bool is_first = rows.first == 0;
-  const bool is_last = rows.last + 1 == info.height;
-  EdgeRange edge(info, axes.x.continued_samples(), axes.z.continued_samples(), is_first, is_last);
-  // Of the rows beside them edges alone are looked at: what lies between two rows, and all of the North and South edge.
-  const auto look_at = [&](std::int64_t first, std::int64_t end) {
-    if (first >= end) return;
-    std::vector<std::byte> raw(static_cast<std::size_t>((end - first) * info.width) * size_bytes(info.sample_type));
-    conversion.source.read_window({0, first, info.width, end - first}, raw);
-    edge.add_window({0, first, info.width, end - first}, raw);
-  };
-  if (is_last && !is_first) look_at(std::min(rows.first, info.height - edge.depth_rows()), rows.first);
-  const SourceSurvey survey = survey_source(conversion, rows, edge);
-  if (!is_last) {
-    look_at(rows.last + 1, std::min(std::max(rows.last + 2, is_first ? edge.depth_rows() : 0), info.height));
-  }
-  const SourceScan found = survey.scan();
-  if (found.valid > 0) warn_of_unit_range(info, found.range, warnings);
-  if (const std::string warning = survey.warning(); !warning.empty()) warnings.push_back(info.path + ": " + warning);
-  return {found, edge.bound()};
-}
-
-bool choose_codes_by(Conversion& conversion, const RangeScan& scan, bool may_cut) {
-  const SourceInfo& info = conversion.source.info();
-  SourceScan found = scan.samples;
+  EdgeRange edge(info, axes.x.continued_samples(), axes.z.continued_samples());
+  const SourceSurvey survey = survey_source(conversion, edge);
+  SourceScan found = survey.scan();
+  if (found.valid > 0) warn_of_unit_range(info, found.range, summary.warnings);
+  if (const std::string warning = survey.warning(); !warning.empty())
+    summary.warnings.push_back(info.path + ": " + warning);
+  summary.source_voids = found.voids;
   if (found.valid == 0) {
     throw Error(ErrorCode::kUnsupported,
                 fmt::format("{}: all {} samples are void or not finite, there is no elevation to convert", info.path,
                             found.voids));
   }
   const QuantisationRequest request = request_of(conversion, found.range);
-  if (conversion.plan.outside != Outside::kClamp) found.range = EdgeRange::widen(found.range, scan.edges);
+  if (conversion.plan.outside != Outside::kClamp) found.range = EdgeRange::widen(found.range, edge.bound());
   conversion.quantisation = choose_quantisation(request, found.range, info);
   const double over = overshoot(conversion.kernel, conversion.prefilter);
-  if (over == 0.0 || conversion.options.code_type == CodeType::kF32) return true;
-  // The surface may leave the samples' range. Where the codes reach far enough for the worst case at the same step,
-  // nothing needs to be measured; next to voids and on a raster between whose ends little lies there is no such bound.
-  const bool is_large =
-      std::min(info.width, info.height) > 2 * (conversion.prefilter.halo() + conversion.kernel.taps());
-  const bool has_step = request.max_rounding || (request.step ? *request.step != 0.0 : !is_floating(info.sample_type));
-  const ElevationRange reach = widened(found.range, over);
-  if (found.voids == 0 && is_large && has_step && has_codes_for(conversion.quantisation, reach)) {
-    conversion.quantisation = choose_quantisation({request.type, conversion.quantisation.scale}, reach, info);
-    return true;
+  if (over > 0.0 && conversion.options.code_type != CodeType::kF32) {
+    // The surface may leave the samples' range. Where the codes reach far enough for the worst case at the same step,
+    // nothing needs to be measured; next to voids and on a raster between whose ends little lies there is no such bound.
+    const bool is_large =
+        std::min(info.width, info.height) > 2 * (conversion.prefilter.halo() + conversion.kernel.taps());
+    const bool has_step =
+        request.max_rounding || (request.step ? *request.step != 0.0 : !is_floating(info.sample_type));
+    const ElevationRange reach = widened(found.range, over);
+    conversion.quantisation = found.voids == 0 && is_large && has_step && has_codes_for(conversion.quantisation, reach)
+                                  ? choose_quantisation({request.type, conversion.quantisation.scale}, reach, info)
+                                  : choose_quantisation(request, measure_surface(conversion, found.range), info);
   }
-  if (!may_cut) return false;
-  conversion.quantisation = choose_quantisation(request, measure_surface(conversion, found.range), info);
-  return true;
-}
-
-void choose_codes(Conversion& conversion, ConvertSummary& summary) {
-  if (conversion.options.z_range) {
-    const ElevationRange range{conversion.options.z_range->first, conversion.options.z_range->second};
-    conversion.quantisation = quantisation_of_range(request_of(conversion, range), range, conversion.source.info());
-    conversion.limits = {range.min, range.max};
-    return;
-  }
-  const RangeScan scan = scan_range(conversion, {0, conversion.source.info().height - 1}, summary.warnings);
-  summary.source_voids = scan.samples.voids;
-  (void)choose_codes_by(conversion, scan, true);
   conversion.limits = code_limits(conversion.quantisation);
 }
 

@@ -23,11 +23,8 @@ void include(ElevationRange& range, float height) {
 
 }  // namespace
 
-EdgeRange::EdgeRange(const SourceInfo& info, std::int64_t depth_columns, std::int64_t depth_rows, bool north,
-                     bool south)
+EdgeRange::EdgeRange(const SourceInfo& info, std::int64_t depth_columns, std::int64_t depth_rows)
     : info_(info),
-      has_north_(north),
-      has_south_(south),
       depth_columns_(static_cast<std::size_t>(std::min(depth_columns + 2, info.width))),
       depth_rows_(static_cast<std::size_t>(std::min(depth_rows + 2, info.height))),
       bound_{kInfinity, -kInfinity} {}
@@ -78,13 +75,9 @@ void EdgeRange::add_window(const Window& window, std::span<const std::byte> raw)
           info_, 0.0, row,
           std::span(rows).subspan(from_edge * width + static_cast<std::size_t>(window.column), columns));
     };
-    if (has_north_) keep(north_, from_north);
-    if (has_south_) keep(south_, from_south);
+    keep(north_, from_north);
+    keep(south_, from_south);
   }
-}
-
-std::uint64_t EdgeRange::memory_bytes() const {
-  return 2 * sizeof(float) * depth_rows_ * static_cast<std::uint64_t>(info_.width);
 }
 
 void EdgeRange::add_edge_rows(const std::vector<float>& rows, ElevationRange& bound) const {

@@ -20,19 +20,11 @@ namespace isohf {
 /// round.
 class EdgeRange {
  public:
-  /// north, south  whether these edges count: false where not all of their rows come
-  EdgeRange(const SourceInfo& info, std::int64_t depth_columns, std::int64_t depth_rows, bool north = true,
-            bool south = true);
-
-  /// Rows that the North edge takes, and the South edge.
-  [[nodiscard]] std::int64_t depth_rows() const { return static_cast<std::int64_t>(depth_rows_); }
+  EdgeRange(const SourceInfo& info, std::int64_t depth_columns, std::int64_t depth_rows);
 
   /// raw [window.rows * window.columns samples]. Windows that touch the West or the East edge come from North to South
   /// and hold all columns that count there: ReadStep's do. The others come in any order.
   void add_window(const Window& window, std::span<const std::byte> raw);
-
-  /// Memory, bytes.
-  [[nodiscard]] std::uint64_t memory_bytes() const;
 
   /// After all windows: what every continued elevation lies in; empty, min above max, where nothing is known.
   [[nodiscard]] ElevationRange bound() const;
@@ -52,8 +44,6 @@ class EdgeRange {
   void add_edge_rows(const std::vector<float>& rows, ElevationRange& bound) const;
 
   const SourceInfo& info_;
-  bool has_north_;
-  bool has_south_;
   std::size_t depth_columns_;
   std::size_t depth_rows_;
   std::vector<float> north_;                            ///< [depth_rows][width], from the edge
