@@ -652,6 +652,7 @@ class Archive:
         self.metadata = json.loads(self.member("isohf.json"))
         require(self.metadata["format"] == "isohf" and self.metadata["version"] == 2, "another version: not supported")
         require(not self.metadata.get("requires"), "requires what is not known: not supported")
+        require("shard" not in self.metadata, "is a shard: merge it with the others first")
         raw_range = self.metadata["source"]["voids"].get("raw_range") or (0, 0)
         require(float(raw_range[0]) <= float(raw_range[1]), "raw_range is not the smaller number first")
         self.shape, self.grid = self.metadata["tile_shape"], self.metadata["tiles"]
@@ -993,7 +994,7 @@ def main(path, samples=None):
     require(archive.content_hash() == archive.metadata["content_sha256"], "another content hash")
     require(archive.ground_hash() == archive.metadata["ground_sha256"], "another ground hash")
     archive.check_planes()
-    if "shadow_seeds" in archive.metadata and "part" not in archive.metadata:  # a part's tell of what isn't here
+    if "shadow_seeds" in archive.metadata:
         archive.check_seeds()
     if "tile_textures" in archive.metadata:
         archive.check_textures()

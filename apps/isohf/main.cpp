@@ -32,7 +32,7 @@ constexpr Command kCommands[] = {
     {"sample", "Print elevation and normal at places", command_sample},
     {"shade", "Draw a picture of the surface with its shadows", command_shade},
     {"extract", "Cut some tiles of an archive into one of their own", command_extract},
-    {"merge", "Join archives that share a lattice", command_merge},
+    {"merge", "Join the shards of a conversion", command_merge},
     {"diff", "Compare two archives", command_diff},
     {"view", "Fly over an archive in a window, or draw it without one", command_view},
     {"formats", "List the formats that are read and written", command_formats},

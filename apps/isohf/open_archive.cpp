@@ -19,9 +19,9 @@ std::string what_else(const std::string& path) {
   return "is no isohf archive but " + found.is;
 }
 
-ArchiveReader open_archive(const std::string& path) {
+ArchiveReader open_archive(const std::string& path, ArchiveReader::Shards shards) {
   try {
-    ArchiveReader archive(path);
+    ArchiveReader archive(path, shards);
     try {
       understand_world(archive);
     } catch (const Error&) {

@@ -7,7 +7,8 @@
 namespace isohf::cli {
 
 /// Opens an archive. Of a file that is none the error says what it is instead, and which command would help.
-[[nodiscard]] ArchiveReader open_archive(const std::string& path);
+[[nodiscard]] ArchiveReader open_archive(const std::string& path,
+                                         ArchiveReader::Shards shards = ArchiveReader::Shards::kRefused);
 
 /// The same, and has the map understood that its source lies on where it was projected from one: what is made of the
 /// archive then ends with the source.

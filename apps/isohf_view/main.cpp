@@ -63,8 +63,7 @@ std::string text_from(const ViewReport& report, const std::string& archive) {
       cli::describe_count(report.vertices), cli::describe_count(report.shared_vertices), report.worst_height,
       report.worst_normal);
   if (report.suns_deg.empty()) {
-    text += fmt::format("shadows: not looked at, as {}\n",
-                        report.is_part ? "tiles that may cast them are elsewhere" : "tiles are at fault");
+    text += "shadows: not looked at, as tiles are at fault\n";
   } else {
     text += fmt::format(
         "shadows: suns of {:g} degrees, East and West, {} vertices, worst {:.4f} codes, share of the sun {:.2e}\n",

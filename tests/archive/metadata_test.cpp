@@ -11,7 +11,7 @@
 #include "archive/codec/tiles.h"
 #include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/archive/metadata/json_members.h"
-#include "isohf/archive/metadata/part_record.h"
+#include "isohf/archive/metadata/shard_record.h"
 #include "isohf/archive/shadow_seeds/shadow_seeds.h"
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/error.h"
@@ -331,7 +331,7 @@ TEST(Metadata, AreDescribedByTheSchemaOfTheirTable) {
   made["properties"]["statistics"]["type"] = {"object", "null"};  // what a plan prints has none yet
   made["properties"]["accuracy"] = extension_schema(accuracy_members);
   made["properties"]["tile_textures"] = extension_schema(texture_members);
-  made["properties"]["part"] = extension_schema(part_members);
+  made["properties"]["shard"] = extension_schema(shard_members);
   made["properties"]["shadow_seeds"] = extension_schema(shadow_seed_members);
   const Json file = resolved(schema_file("metadata.json"), schema_file("common.json"));
   EXPECT_TRUE(file.at("required") == made["required"]) << made["required"].dump();

@@ -1,4 +1,4 @@
-#include "isohf/shards.h"
+#include "isohf/parts.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,15 +8,16 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <random>
 
-#include "isohf/archive/attach.h"
 #include "isohf/convert.h"
 #include "isohf/error.h"
-#include "isohf/parts.h"
+#include "isohf/shards.h"
 #include "isohf/surface.h"
 #include "isohf/verify.h"
 #include "support/rasters/memory_photo.h"
 #include "support/rasters/memory_source.h"
+#include "support/rasters/place_at.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -46,22 +47,18 @@ class Parts : public testing::Test {
     options.producer = "isohf test";
     options.z_range = {270.0, 330.0};
     options.shadow_seeds.emplace();
+    options.texture.emplace();
+    options.texture->photo = &photo;
   }
   std::string make(const std::string& name, double rise = 0.0) {
     Hills source(rise);
     (void)convert(source, folder / name, options);
     return folder / name;
   }
-  std::string cut(const std::string& archive, const std::string& name, const TileRange& tiles) {
-    (void)extract_tiles(archive, folder / name, tiles, {.overwrite = true});
-    return folder / name;
-  }
-  std::string message_of(const std::vector<std::string>& archives) {
+  std::string refusal(const std::function<void()>& action) {
     try {
-      (void)merge_archives(archives, folder / "refused.isohf");
+      action();
     } catch (const Error& error) {
-      EXPECT_FALSE(std::filesystem::exists(folder / "refused.isohf"));
-      EXPECT_FALSE(std::filesystem::exists(folder / "refused.isohf.part"));
       return error.what();
     }
     return "nothing was refused";
@@ -69,75 +66,150 @@ class Parts : public testing::Test {
 
   test::TemporaryFolder folder;
   ConvertOptions options;
+  test::MemoryPhoto photo{210, 150, 3, [](std::int64_t c, std::int64_t r, int channel) {
+                            return static_cast<int>((c * 3 + r * 5 + channel * 60) % 256);
+                          }};
 };
 
-TEST_F(Parts, ComplementaryOnesGiveTheWholesBytesInAnyOrder) {
-  test::MemoryPhoto photo(210, 150, 3, [](std::int64_t c, std::int64_t r, int channel) {
-    return static_cast<int>((c * 3 + r * 5 + channel * 60) % 256);
-  });
+class Extract : public Parts {
+ protected:
+  /// Cuts tiles of a plane, and compares the elevations of 200 places on them with the whole's.
+  void expect_same_elevations(const std::string& whole, int plane, const TileRange& tiles) {
+    const std::string cut = folder / "cut.isohf";
+    (void)extract_tiles(whole, cut, plane, tiles, {.overwrite = true});
+    const VerifyReport report = verify_archive(cut);
+    EXPECT_TRUE(report.passed()) << (report.findings.empty() ? "" : report.findings.front().text);
+    ArchiveReader from(whole);
+    ArchiveReader to(cut);
+    const Metadata& metadata = to.metadata();
+    if (plane > 0) return;  // other triangles
+    Surface before(from);
+    Surface after(to);
+    const double west = static_cast<double>(tiles.first.column) * from.grid().extent_x();
+    const double north = static_cast<double>(tiles.first.row) * from.grid().extent_z();
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> part(0.0, 1.0);
+    int places = 0;
+    for (int i = 0; i < 200; ++i) {
+      const WorldPoint at{part(random) * metadata.grid.world_width(), part(random) * metadata.grid.world_height()};
+      const WorldPoint there{at.x + west, at.z + north};
+      const double expected = before.at(there).elevation;
+      const auto compare = [&](double found) {
+        ASSERT_EQ(std::isnan(found), std::isnan(expected)) << at.x << " " << at.z;
+        // Places are sums that round.
+        if (std::isnan(expected)) return;
+        ASSERT_NEAR(found, expected, 1e-7) << at.x << " " << at.z;
+      };
+      compare(after.at(at).elevation);
+      const WorldGeoreference geo(metadata);
+      if (!geo.has_geo()) continue;
+      ++places;
+      const GeoPoint place = geo.geo_from_world(at);
+      compare(after.at(place).elevation);
+      if (std::isnan(expected)) continue;
+      ASSERT_NEAR(before.at(place).elevation, expected, 1e-7);
+    }
+    EXPECT_EQ(places, metadata.source.crs_unit == "degree" ? 200 : 0);
+  }
+
+  /// A globe of areas, or a piece of it.
+  static std::unique_ptr<test::MemorySource<float>> degrees(double west, double north, double spacing,
+                                                            Registration registration = Registration::kArea) {
+    auto source =
+        std::make_unique<test::MemorySource<float>>(SampleType::kFloat32, 180, 90, [](std::int64_t c, std::int64_t r) {
+          return 300.0 +
+                 20.0 * std::sin(static_cast<double>(c) * M_PI / 45.0) * std::cos(static_cast<double>(r) * 0.06);
+        });
+    source->mutable_info().georeference = test::place_at(registration, HorizontalUnit::kDegree, west, north, spacing);
+    source->mutable_info().vertical_unit = "metre";
+    return source;
+  }
+};
+
+TEST_F(Extract, OfAnyKindOfArchiveKeepsElevationsAndPlaces) {
   for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
     options.code_type = type;
-    options.texture.emplace();
-    options.texture->photo = &photo;
     const std::string whole = make("whole.isohf");
-    test::write_file(folder / "note.txt", "belongs to all of it");
-    (void)attach_members(whole, {{folder / "note.txt", "note.txt"}});
     const TileGrid grid = ArchiveReader(whole).grid();
-    const std::int64_t columns = grid.tile_columns();
-    const std::int64_t rows = grid.tile_rows();
-    ASSERT_GT(columns, 9);
-    ASSERT_GT(rows, 8);
-    const std::string west = cut(whole, "w.isohf", {{0, 0}, {9, 7}});
-    const std::string east = cut(whole, "e.isohf", {{9, 0}, {columns, 7}});
-    const std::string south = cut(whole, "s.isohf", {{0, 7}, {columns, rows}});
-    for (const std::string& part : {west, east, south}) {
-      EXPECT_TRUE(verify_archive(part).passed()) << part;
-      const ArchiveReader reader(part);
-      EXPECT_FALSE(tiles_of(reader.metadata()) == tiles_of(ArchiveReader(whole).metadata()));
-      EXPECT_TRUE(reader.find_member("note.txt").has_value());
-    }
-    const PartSummary joined = merge_archives({south, west, east}, folder / "joined.isohf", {.overwrite = true});
-    EXPECT_TRUE(joined.is_whole);
-    EXPECT_TRUE(joined.same_as_whole);
-    EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole));
-    // By way of a part of two parts, and of a part cut from that.
-    (void)merge_archives({west, east}, folder / "north.isohf", {.overwrite = true});
-    EXPECT_TRUE(verify_archive(folder / "north.isohf").passed());
-    const std::string again = cut(folder / "north.isohf", "again.isohf", {{0, 0}, {9, 7}});
-    EXPECT_EQ(test::read_file(again), test::read_file(west));
-    (void)merge_archives({folder / "north.isohf", south}, folder / "joined.isohf", {.overwrite = true});
-    EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole));
+    ASSERT_GT(grid.tile_columns(), 12);
+    ASSERT_GT(grid.tile_rows(), 8);
+    expect_same_elevations(whole, 0, {{3, 1}, {9, 5}});
+    expect_same_elevations(whole, 0, {{9, 6}, {grid.tile_columns(), grid.tile_rows()}});
+    expect_same_elevations(whole, 0, {{0, 0}, {grid.tile_columns(), grid.tile_rows()}});
+    expect_same_elevations(whole, 0, {{7, 7}, {8, 8}});
+    expect_same_elevations(whole, 1, {{0, 0}, {1, 1}});
   }
 }
 
-TEST_F(Parts, OfALosslessArchiveShareItsResidualsAndGiveThemBack) {
+TEST_F(Extract, OfDegreesAndGlobesKeepsElevationsAndPlaces) {
+  options.texture.reset();
+  for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
+    for (const char* projection : {"equirectangular", "local", "none"}) {
+      options.plan.ground.projection = ProjectionRequest::parse(projection);
+      const auto source = degrees(5.005, 46.995, 0.01, registration);
+      (void)convert(*source, folder / "whole.isohf", options);
+      const TileGrid grid = ArchiveReader(folder / "whole.isohf").grid();
+      SCOPED_TRACE(projection);
+      expect_same_elevations(folder / "whole.isohf", 0, {{1, 1}, {4, 3}});
+      expect_same_elevations(folder / "whole.isohf", 0, {{4, 2}, {grid.tile_columns(), grid.tile_rows()}});
+    }
+    options.plan.ground = {};
+    options.plan.ground.wrap_x = true;
+    const auto globe = degrees(registration == Registration::kArea ? -179.0 : -180.0, 89.0, 2.0, registration);
+    (void)convert(*globe, folder / "globe.isohf", options);
+    const ArchiveReader whole(folder / "globe.isohf");
+    ASSERT_TRUE(whole.metadata().wraps_x);
+    const std::int64_t columns = whole.grid().tile_columns();
+    expect_same_elevations(folder / "globe.isohf", 0, {{columns - 3, 0}, {columns, 3}});
+    EXPECT_FALSE(ArchiveReader(folder / "cut.isohf").metadata().wraps_x);
+    expect_same_elevations(folder / "globe.isohf", 0, {{0, 1}, {columns, 3}});
+    EXPECT_TRUE(ArchiveReader(folder / "cut.isohf").metadata().wraps_x);
+    options.plan.ground = {};
+  }
+}
+
+TEST_F(Extract, CopiesTexturesMakesSeedsAndLeavesResidualsOut) {
   options.lossless = true;
   const std::string whole = make("whole.isohf");
-  const TileGrid grid = ArchiveReader(whole).grid();
-  const std::int64_t columns = grid.tile_columns();
-  const std::string north_west = cut(whole, "nw.isohf", {{0, 0}, {5, 4}});
-  const std::string north_east = cut(whole, "ne.isohf", {{5, 0}, {columns, 4}});
-  const std::string south = cut(whole, "s.isohf", {{0, 4}, {columns, grid.tile_rows()}});
-  for (const std::string& part : {north_west, north_east, south}) {
-    const ArchiveReader reader(part);
-    EXPECT_TRUE(verify_archive(part).passed()) << part;
-    EXPECT_FALSE(lossless_record(reader.metadata()).has_value()) << "it cannot give the samples";
-    EXPECT_EQ(reader.find_member("residual/00000000").has_value(), part == north_west);
+  const std::string cut = folder / "cut.isohf";
+  const PartSummary summary = extract_tiles(whole, cut, 0, {{8, 5}, {12, 8}});
+  EXPECT_THAT(summary.warnings, testing::ElementsAre(HasSubstr("residuals are left out")));
+  const ArchiveReader from(whole);
+  const ArchiveReader to(cut);
+  EXPECT_FALSE(lossless_record(to.metadata()).has_value());
+  EXPECT_EQ(to.read_tile({1, 2}), from.read_tile({9, 7}));
+  int textures = 0;
+  for (const MemberTable& table : to.tables()) {
+    if (!table.name.starts_with("textures/")) continue;
+    ++textures;
+    std::string there = table.name;
+    std::string here = table.name;
+    const auto put = [](std::string& name, const char* what, const char* number) {
+      name.replace(name.find(what), std::string(what).size(), number);
+    };
+    put(there, "{row}", "7"), put(there, "{column}", "9");
+    put(here, "{row}", "2"), put(here, "{column}", "1");
+    EXPECT_EQ(to.read_member(here), from.read_member(there)) << here;
   }
-  const PartSummary joined = merge_archives({south, north_east, north_west}, folder / "joined.isohf");
-  EXPECT_TRUE(joined.same_as_whole);
-  EXPECT_TRUE(joined.warnings.empty());
-  EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole));
-  // Joined with other land they are nobody's.
-  const std::string changed = make("changed.isohf", 9.0);
-  const PartSummary mixed = merge_archives({whole, changed}, folder / "mixed.isohf");
-  ASSERT_EQ(mixed.warnings.size(), 1U);
-  EXPECT_THAT(mixed.warnings.front(), HasSubstr("residuals are left out"));
-  EXPECT_FALSE(ArchiveReader(folder / "mixed.isohf").find_member("residual/00000000").has_value());
-  EXPECT_TRUE(verify_archive(folder / "mixed.isohf").passed());
+  EXPECT_GT(textures, 0);
+  EXPECT_THAT(refusal([&] { (void)extract_tiles(whole, cut, 0, {{8, 5}, {12, 8}}); }), HasSubstr("exists"));
+  EXPECT_THAT(refusal([&] {
+                (void)extract_tiles(whole, folder / "a.isohf", 0, {{8, 5}, {12, 8}}, {.strict = true});
+              }),
+              HasSubstr("residuals are left out"));
+  EXPECT_THAT(refusal([&] {
+                (void)extract_tiles(whole, folder / "a.isohf", 0, {{0, 0}, {100, 1}});
+              }),
+              HasSubstr("of tiles are asked for"));
+  EXPECT_THAT(refusal([&] {
+                (void)extract_tiles(whole, folder / "a.isohf", 9, {{0, 0}, {1, 1}});
+              }),
+              HasSubstr("plane 9 is asked for"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.isohf"));
 }
 
-TEST_F(Parts, LastArchiveGivesTheTileAndEverythingFollows) {
+TEST_F(Parts, DiffSaysHowFarElevationsLieApart) {
+  options.texture.reset();
   const std::string old = make("old.isohf");
   const std::string changed = make("changed.isohf", 9.0);
   const ArchiveDifference difference = diff_archives(old, changed, true);
@@ -161,136 +233,61 @@ TEST_F(Parts, LastArchiveGivesTheTileAndEverythingFollows) {
   EXPECT_NEAR(most, 9.0, 1.5);
   EXPECT_NEAR(static_cast<double>(changed_samples), 3.14 * 14.0 * 14.0, 100.0);  // the filter reaches beyond it
   EXPECT_NEAR(static_cast<double>(voids), 3.14 * 25.0 * 25.0, 250.0);            // the lake
-  // With what is around, so that edges meet: but the seeds of these rows are those of the joined tiles.
-  const TileRange& around = difference.bounds;
-  const std::string update = cut(changed, "update.isohf", around);
-  const PartSummary joined = merge_archives({old, update}, folder / "joined.isohf");
-  EXPECT_FALSE(joined.same_as_whole);
-  EXPECT_EQ(ArchiveReader(folder / "joined.isohf").metadata().content_sha256,
-            ArchiveReader(changed).metadata().content_sha256);
-  EXPECT_TRUE(verify_archive(folder / "joined.isohf").passed());
-  EXPECT_TRUE(diff_archives(changed, folder / "joined.isohf").same_tiles());
-  // Parts of two origins need no neighbours beyond their own; what lies beside tiles must be of one kind.
-  const PartSummary small = merge_archives({cut(old, "old_part.isohf", around), update}, folder / "parts.isohf");
-  EXPECT_EQ(small.tiles, around);
-  EXPECT_TRUE(diff_archives(changed, folder / "parts.isohf").same_tiles());
-  options.shadow_seeds.reset();
-  EXPECT_THAT(message_of({old, make("unlit.isohf")}), HasSubstr("has other shadow seeds than"));
-  options.shadow_seeds.emplace();
-  options.filter = Filter::kBilinear;
-  const PartSummary other = merge_archives({old, make("bilinear.isohf")}, folder / "other.isohf");
-  EXPECT_THAT(other.warnings, testing::ElementsAre(HasSubstr("bilinear.isohf: was made with another filter than")));
-  EXPECT_EQ(small.warnings.size(), 0U);
-  options.filter.reset();
-  // A piece of it does not meet what lies around.
-  const std::string torn = cut(changed, "torn.isohf", {around.first, {around.first.column + 1, around.end.row}});
-  if (around.end.column - around.first.column > 1) {
-    EXPECT_THAT(message_of({old, torn}), HasSubstr("does not meet its neighbour of"));
-  }
-}
-
-TEST_F(Parts, AllThatIsWrongIsSaidBeforeAnythingIsWritten) {
-  const std::string whole = make("whole.isohf");
-  const std::int64_t columns = ArchiveReader(whole).grid().tile_columns();
-  const std::string west = cut(whole, "w.isohf", {{0, 0}, {4, 5}});
-  const std::string east = cut(whole, "e.isohf", {{6, 0}, {columns, 5}});
-  EXPECT_THAT(message_of({west, east}), HasSubstr("tiles of columns 4 to 5 and rows 0 to 4 are in none"));
-  std::string bytes = test::read_file(east);
-  test::write_file(folder / "cut.isohf", bytes.substr(0, bytes.size() / 2));
-  bytes[bytes.size() / 3] = static_cast<char>(bytes[bytes.size() / 3] ^ 1);
-  test::write_file(folder / "bit.isohf", bytes);
-  const std::string found = message_of({west, folder / "cut.isohf", folder / "none.isohf", folder / "bit.isohf"});
-  for (const char* name : {"cut.isohf: ", "none.isohf: ", "bit.isohf: its members' data"}) {
-    EXPECT_THAT(found, HasSubstr(name));
-  }
   options.step = 0.01;
   options.z_range.reset();
-  const std::string other = make("other.isohf");
-  EXPECT_THAT(message_of({whole, other}), HasSubstr("other.isohf: has elevations"));
   // Elevations are compared whatever their codes: both steps together are as far as they can lie apart.
-  const ArchiveDifference apart = diff_archives(whole, other, true);
+  const std::string other = make("other.isohf");
+  const ArchiveDifference apart = diff_archives(old, other, true);
   EXPECT_EQ(apart.why_other_lattice, "");
   EXPECT_GT(apart.surface->compared, 0);
-  EXPECT_LE(apart.surface->max, 0.5 * (ArchiveReader(whole).metadata().quantisation.scale + 0.01) + 1e-4);
-  EXPECT_THROW((void)merge_archives({whole}, whole, {.overwrite = true}), Error);
-  EXPECT_THROW(cut(whole, "beyond.isohf", {{0, 0}, {columns + 1, 1}}), Error);
-  EXPECT_THROW(cut(west, "beyond.isohf", {{3, 0}, {5, 1}}), Error);
+  EXPECT_LE(apart.surface->max, 0.5 * (ArchiveReader(old).metadata().quantisation.scale + 0.01) + 1e-4);
 }
 
-/// The shards of a plan, made in an odd order.
+/// Shards, made in an odd order.
 class Shards : public Parts {
  protected:
-  std::vector<std::string> make_shards(HeightSource& source, const ShardPlan& plan, const std::string& name) {
+  std::vector<std::string> make_shards(HeightSource& source, int count, const std::string& name) {
     std::vector<std::string> files;
-    const int count = static_cast<int>(plan.shards.size());
     for (int i = 0; i < count; ++i) {
       const int number = count % 2 == 0 ? count - i : (i * 2 + 1) % count + 1;
       files.push_back(folder / (name + std::to_string(number) + ".isohf"));
-      (void)convert_shard(source, plan, number, files.back(), options);
-      EXPECT_TRUE(is_shard(files.back(), plan, number));
-      EXPECT_EQ(is_shard(files.back(), plan, number % count + 1), count == 1);
-      EXPECT_TRUE(verify_archive(files.back()).passed()) << number;
+      (void)convert_shard(source, {number, count}, files.back(), options);
+      EXPECT_TRUE(is_shard(files.back(), source, {number, count}, options));
+      EXPECT_EQ(is_shard(files.back(), source, {number % count + 1, count}, options), count == 1);
     }
     return files;
   }
-  std::string refusal(const std::function<void()>& action) {
-    try {
-      action();
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "nothing was refused";
+  void expect_bytes_of_one_run(int count) {
+    const std::string whole = make("whole.isohf");
+    Hills source;
+    const std::vector<std::string> files = make_shards(source, count, "part-");
+    EXPECT_TRUE(missing_shards(files).numbers.empty());
+    const PartSummary joined = merge_shards(files, folder / "joined.isohf", {.overwrite = true});
+    EXPECT_TRUE(joined.warnings.empty());
+    EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole)) << count << " shards";
   }
 };
 
 TEST_F(Shards, JoinToTheBytesOfOneRun) {
-  test::MemoryPhoto photo(210, 150, 3, [](std::int64_t c, std::int64_t r, int channel) {
-    return static_cast<int>((c * 3 + r * 5 + channel * 60) % 256);
-  });
+  options.filter = Filter::kBspline3;
   for (const CodeType type : {CodeType::kU16, CodeType::kF32}) {
-    for (const bool given : {true, false}) {
-      options.code_type = type;
-      if (!given) options.z_range.reset();
-      options.filter = given ? Filter::kBspline3 : Filter::kBilinear;
-      if (!given) options.plan.shape = {8, 11};  // two shards end with rows of the first plane: nothing is decoded
-      options.texture.emplace();
-      options.texture->photo = &photo;
-      const std::string whole = make("whole.isohf");
-      Hills source;
-      const int count = given ? 5 : 2;
-      const ShardPlan plan = parse_shard_plan(format_shard_plan(plan_shards(source, options, count)));
-      ASSERT_EQ(static_cast<int>(plan.shards.size()), count);
-      const std::vector<std::string> files = make_shards(source, plan, "part-");
-      EXPECT_TRUE(missing_shards(plan, files).empty());
-      const PartSummary joined = merge_shards(plan, files, folder / "joined.isohf", {.overwrite = true});
-      EXPECT_TRUE(joined.is_whole);
-      EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole));
-    }
-    options.z_range = {270.0, 330.0};
-    options.plan.shape = {12, 19};
+    options.code_type = type;
+    expect_bytes_of_one_run(5);
   }
+  // Floats need no range; two shards end with rows of the first plane: nothing is decoded.
+  options.z_range.reset();
+  options.filter = Filter::kBilinear;
+  options.plan.shape = {8, 11};
+  expect_bytes_of_one_run(2);
+  expect_bytes_of_one_run(1);
 }
 
 TEST_F(Shards, OfALosslessConversionJoinToItsBytes) {
   options.lossless = true;
+  options.filter = Filter::kBilinear;
   for (const CodeType type : {CodeType::kU8, CodeType::kF32}) {
-    for (const int count : {2, 5, 9}) {
-      options.code_type = type;
-      options.filter = Filter::kBilinear;
-      if (type == CodeType::kF32) options.z_range.reset();
-      const std::string whole = make("whole.isohf");
-      Hills source;
-      const ShardPlan plan = parse_shard_plan(format_shard_plan(plan_shards(source, options, count)));
-      EXPECT_EQ(plan.samples_sha256, lossless_record(ArchiveReader(whole).metadata())->sha256);
-      const std::vector<std::string> files = make_shards(source, plan, "part-");
-      const PartSummary joined = merge_shards(plan, files, folder / "joined.isohf", {.overwrite = true});
-      EXPECT_TRUE(joined.warnings.empty());
-      EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(whole));
-      options.lossless = false;
-      EXPECT_THAT(refusal([&] { (void)convert_shard(source, plan, 1, folder / "a.isohf", options); }),
-                  HasSubstr("planned was \"lossless\""));
-      options.lossless = true;
-    }
+    options.code_type = type;
+    for (const int count : {2, 5, 9}) expect_bytes_of_one_run(count);
   }
 }
 
@@ -298,84 +295,102 @@ TEST(ShardList, JoinsNumbersThatFollowEachOther) {
   EXPECT_EQ(shard_list({1, 3, 4, 5, 9}), "1,3-5,9");
 }
 
-TEST_F(Shards, OfFewRowsAreAsManyAsThereAreRows) {
-  Hills source;
-  const ShardPlan plan = plan_shards(source, options, 1000);
-  EXPECT_EQ(static_cast<std::int64_t>(plan.shards.size()), plan.tile_rows);
-  const ShardPlan two = plan_shards(source, options, 1);
-  ASSERT_EQ(two.shards.size(), 1U);
-  (void)make("whole.isohf");
-  (void)merge_shards(two, make_shards(source, two, "one-"), folder / "joined.isohf");
-  EXPECT_EQ(test::read_file(folder / "joined.isohf"), test::read_file(folder / "whole.isohf"));
-}
-
 TEST_F(Shards, InterruptedGoOnAndGiveTheSameBytes) {
   Hills source;
-  const ShardPlan plan = plan_shards(source, options, 3);
-  const std::vector<std::string> files = make_shards(source, plan, "part-");
+  const std::vector<std::string> files = make_shards(source, 3, "part-");
   const std::string file = folder / "again.isohf";
   std::atomic<bool> cancel = false;
   Job job;
   job.cancel = &cancel;
   job.progress = [&](const Progress& at) { cancel = at.done > at.total / 2; };
   options.resume = true;
-  EXPECT_THROW((void)convert_shard(source, plan, 2, file, options, job), Error);
-  EXPECT_FALSE(is_shard(file, plan, 2));
-  (void)convert_shard(source, plan, 2, file, options);
+  EXPECT_THROW((void)convert_shard(source, {2, 3}, file, options, job), Error);
+  EXPECT_FALSE(is_shard(file, source, {2, 3}, options));
+  (void)convert_shard(source, {2, 3}, file, options);
   EXPECT_EQ(test::read_file(file), test::read_file(folder / "part-2.isohf"));
   // What another shard left under the name is told of, and where it was removed its journal is in nobody's way.
   std::filesystem::remove(file);
   cancel = false;
-  EXPECT_THROW((void)convert_shard(source, plan, 2, file, options, job), Error);
-  EXPECT_THAT(refusal([&] { (void)convert_shard(source, plan, 3, file, options); }),
+  EXPECT_THROW((void)convert_shard(source, {2, 3}, file, options, job), Error);
+  EXPECT_THAT(refusal([&] {
+                (void)convert_shard(source, {3, 3}, file, options);
+              }),
               HasSubstr(".part belongs to another input or other options; remove it to start over"));
   std::filesystem::remove(file + ".part");
-  (void)convert_shard(source, plan, 3, file, options);
+  (void)convert_shard(source, {3, 3}, file, options);
   EXPECT_EQ(test::read_file(file), test::read_file(folder / "part-3.isohf"));
 }
 
-TEST_F(Shards, AreRefusedWhereTheyAreNotWhatWasPlanned) {
+TEST_F(Shards, AreRefusedByAllButTheMerge) {
   Hills source;
-  const ShardPlan plan = plan_shards(source, options, 3);
-  const std::vector<std::string> files = make_shards(source, plan, "part-");
+  const std::vector<std::string> files = make_shards(source, 3, "part-");
+  const std::string third = folder / "part-3.isohf";
+  const std::string expected = third + ": is shard 3 of 3; merge the shards first: isohf merge ";
+  EXPECT_THAT(refusal([&] { const ArchiveReader reader(third); }), HasSubstr(expected));
+  EXPECT_THAT(refusal([&] { (void)verify_archive(third); }), HasSubstr(expected));
+  EXPECT_THAT(refusal([&] {
+                (void)extract_tiles(third, folder / "a.isohf", 0, {{0, 0}, {1, 1}});
+              }),
+              HasSubstr(expected));
+  EXPECT_THAT(refusal([&] { (void)diff_archives(third, third); }), HasSubstr(expected));
+  EXPECT_EQ(ArchiveReader(third, ArchiveReader::Shards::kRead).metadata().grid.tile_columns(),
+            ArchiveReader(make("whole.isohf")).grid().tile_columns());
+}
+
+TEST_F(Shards, AllThatIsWrongIsSaidBeforeAnythingIsWritten) {
+  Hills source;
+  const std::vector<std::string> files = make_shards(source, 3, "part-");
   const auto merged = [&](const std::vector<std::string>& parts) {
-    return refusal([&] { (void)merge_shards(plan, parts, folder / "refused.isohf"); });
+    const std::string why = refusal([&] { (void)merge_shards(parts, folder / "refused.isohf"); });
+    EXPECT_FALSE(std::filesystem::exists(folder / "refused.isohf"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "refused.isohf.part"));
+    return why;
   };
+  std::string bytes = test::read_file(files[1]);
+  test::write_file(folder / "cut.isohf", bytes.substr(0, bytes.size() / 2));
+  char& code = bytes[bytes.find(".tile") + 20];
+  code = static_cast<char>(code ^ 1);
+  test::write_file(folder / "bit.isohf", bytes);
+  const std::vector<std::string> four = make_shards(source, 4, "four-");
+  const std::string whole = make("whole.isohf");
   options.level = 2;
-  EXPECT_THAT(refusal([&] { (void)convert_shard(source, plan, 1, folder / "a.isohf", options); }),
-              HasSubstr("are not those that were planned: \"level 2\", planned was \"level"));
-  EXPECT_THAT(refusal([&] { (void)convert_shard(source, plan, 4, folder / "a.isohf", options); }),
-              HasSubstr("there is no shard 4: the plan has 1 to 3"));
-  const ShardPlan other = plan_shards(source, options, 3);
-  const std::vector<std::string> foreign = make_shards(source, other, "other-");
-  const std::string found = merged({files[0], files[0], foreign[1], folder / "none.isohf"});
+  const std::vector<std::string> foreign = make_shards(source, 3, "other-");
+  const std::string found = merged({files[0], files[0], foreign[1], folder / "none.isohf", four[0], whole,
+                                    folder / "cut.isohf", folder / "bit.isohf"});
   EXPECT_THAT(found, HasSubstr("none.isohf"));
-  EXPECT_THAT(found, HasSubstr("other-1.isohf: is a shard of another plan"));
+  EXPECT_THAT(found, HasSubstr("other-1.isohf: is a shard of another conversion than"));
+  EXPECT_THAT(found, HasSubstr("four-4.isohf: is shard 4 of 4, "));
+  EXPECT_THAT(found, HasSubstr("whole.isohf: is an archive, not a shard"));
+  EXPECT_THAT(found, HasSubstr("cut.isohf: "));
+  EXPECT_THAT(found, HasSubstr("bit.isohf: its members' data"));
   EXPECT_THAT(found, HasSubstr("is shard 2, as "));
-  EXPECT_THAT(found, HasSubstr("of the plan's 3 shards these are missing: 1,3"));
-  EXPECT_EQ(missing_shards(plan, {files[0], foreign[1]}), (std::vector<int>{1, 3}));
-  EXPECT_THAT(refusal([&] { (void)merge_archives(files, folder / "refused.isohf"); }),
-              HasSubstr("name its plan first"));
-  EXPECT_THAT(merged({make("whole.isohf"), files[0], files[1], files[2]}), HasSubstr("is no shard of a plan"));
+  EXPECT_THAT(found, HasSubstr("of 3 shards these are missing: 1,3"));
+  const MissingShards missing = missing_shards({files[0], foreign[1], folder / "cut.isohf"});
+  EXPECT_EQ(missing.numbers, (std::vector<int>{1, 3}));
+  EXPECT_EQ(missing.count, 3);
+  EXPECT_THAT(refusal([&] { (void)missing_shards({folder / "none.isohf"}); }), HasSubstr("none.isohf"));
   // A local header that no reader of the data looks at: found while members are copied, which then leaves nothing.
   options.planes = false;
-  const ShardPlan two = plan_shards(source, options, 2);
-  const std::vector<std::string> halves = make_shards(source, two, "half-");
+  const std::vector<std::string> halves = make_shards(source, 2, "half-");
   std::string dated = test::read_file(halves[1]);
   char& date = dated[dated.find("tiles/") - 30 + 12];
   date = static_cast<char>(date ^ 1);
   test::write_file(halves[1], dated);
-  EXPECT_THAT(refusal([&] { (void)merge_shards(two, halves, folder / "refused.isohf"); }),
-              HasSubstr("no local header that says what the index says"));
-  EXPECT_FALSE(std::filesystem::exists(folder / "refused.isohf.part"));
-  EXPECT_FALSE(std::filesystem::exists(folder / "refused.isohf"));
+  EXPECT_THAT(merged(halves), HasSubstr("no local header that says what the index says"));
+}
+
+TEST_F(Shards, AreRefusedWithoutWhatNoneCanKnow) {
+  Hills source;
+  const auto refused = [&](const ShardNumber& shard) {
+    return refusal([&] { (void)convert_shard(source, shard, folder / "a.isohf", options); });
+  };
+  EXPECT_THAT(refused({4, 3}), HasSubstr("there is no shard 4 of 3"));
+  EXPECT_THAT(refused({1, 1000}), HasSubstr("1000 shards are too many: the rows of tiles make "));
+  options.z_range.reset();
+  EXPECT_THAT(refused({1, 3}), HasSubstr("a shard needs `z_range`"));
+  options.z_range = {270.0, 330.0};
   options.max_error = 1.0;
-  EXPECT_THAT(refusal([&] { (void)plan_shards(source, options, 2); }),
-              HasSubstr("`max_error` needs all of the source"));
-  std::string json = format_shard_plan(plan);
-  EXPECT_THAT(refusal([&] { (void)parse_shard_plan("{}"); }), HasSubstr("format: is missing"));
-  json.replace(json.find("\"version\": 2"), 12, "\"version\": 9");
-  EXPECT_THAT(refusal([&] { (void)parse_shard_plan(json); }), HasSubstr("version 9, 2 is read"));
+  EXPECT_THAT(refused({1, 3}), HasSubstr("`max_error` needs all of the source"));
 }
 
 TEST(TileRange, MeetsAndIsPutAround) {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "isohf/archive/metadata/accuracy_info.h"
-#include "isohf/archive/metadata/part_record.h"
+#include "isohf/archive/metadata/shard_record.h"
 #include "isohf/archive/shadow_seeds/shadow_seeds.h"
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/error.h"
@@ -32,10 +32,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   tried([&] {
     const isohf::Metadata metadata = isohf::parse_metadata(text);
     tried([&] { static_cast<void>(isohf::lossless_record(metadata)); });
-    tried([&] { static_cast<void>(isohf::part_lossless_record(metadata)); });
     tried([&] { static_cast<void>(isohf::shadow_seed_info(metadata)); });
     tried([&] { static_cast<void>(isohf::texture_info(metadata)); });
-    tried([&] { static_cast<void>(isohf::part_record(metadata)); });
+    tried([&] { static_cast<void>(isohf::shard_record(metadata)); });
     for (int plane = 0; plane <= metadata.planes.count; ++plane) static_cast<void>(metadata.plane_grid(plane));
     // What the first text leaves out is written as what it stands for: from then on nothing changes.
     const std::string written = format_metadata(metadata);

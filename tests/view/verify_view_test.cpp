@@ -6,7 +6,6 @@
 
 #include "gl_test.h"
 #include "isohf/convert.h"
-#include "isohf/parts.h"
 #include "memory_tiles.h"
 #include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
@@ -67,22 +66,6 @@ TEST_F(VerifyViewTest, PassesWhereTilesHaveVoids) {
   const ViewReport report = verify_view(source, make_index_arrays(grid.shape()));
   EXPECT_TRUE(report.passed()) << text_of(report);
   EXPECT_GT(report.shadow_vertices, 0);
-}
-
-TEST_F(VerifyViewTest, OfAPartNothingIsSaidOfTilesThatAreElsewhere) {
-  const test::TemporaryFolder folder;
-  test::MemorySource<float> hills(SampleType::kFloat32, 160, 120, [](std::int64_t c, std::int64_t r) {
-    return 300.0 + 20.0 * std::sin(static_cast<double>(c) * 0.05) * std::cos(static_cast<double>(r) * 0.04);
-  });
-  ConvertOptions options;
-  options.plan.shape = {20, 27};
-  options.plan.levels = 2;
-  (void)convert(hills, folder / "whole.isohf", options);
-  (void)extract_tiles(folder / "whole.isohf", folder / "part.isohf", {{1, 1}, {3, 3}});
-  const auto part = open_archive(folder / "part.isohf");
-  const ViewReport report = verify_view(*part, make_index_arrays(part->grid().shape()));
-  EXPECT_TRUE(report.passed()) << text_of(report);
-  EXPECT_EQ(report.tiles, 4);
 }
 
 TEST_F(VerifyViewTest, PassesOnOddShapes) {

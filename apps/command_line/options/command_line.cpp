@@ -140,7 +140,6 @@ struct CommandLine::State {
   std::string usage_positionals;
   std::string footer;
   std::string config;
-  std::pair<std::string, std::string> settled;  ///< a command, and what is said of its options where they are given
   std::vector<Option> options;
   std::vector<std::set<std::string>> exclusive;
 
@@ -181,9 +180,6 @@ struct CommandLine::State {
   [[noreturn]] void refuse_unknown(const std::string& name) const {
     const std::string near = did_you_mean(name, long_names());
     const std::vector<std::string> others = commands_with(name);
-    if (std::find(others.begin(), others.end(), settled.first) != others.end()) {
-      refuse_usage(fmt::format("{} {}", name, settled.second));
-    }
     refuse_usage(fmt::format(
         "unknown option {}{}", name,
         !near.empty() || others.empty() ? near : fmt::format("; it belongs to {}", fmt::join(others, ", "))));
@@ -566,10 +562,6 @@ std::vector<std::pair<std::string, std::string>> CommandLine::texts_in(const std
       texts.emplace_back(option.name(), option.found.back().values.front());
   }
   return texts;
-}
-
-void CommandLine::settled(const std::string& command, const std::string& why) {
-  state_->settled = {command, why};
 }
 
 void CommandLine::require(const std::string& name, const std::vector<std::string>& values) const {

@@ -82,8 +82,6 @@ class CommandLine {
   /// The options of these groups that parse() met, on the command line or in the --config file, and their text; "true"
   /// for a flag.
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> texts_in(const std::vector<std::string>& groups) const;
-  /// Options of `command` that this line lacks are refused with `why`: they were given elsewhere.
-  void settled(const std::string& command, const std::string& why);
   /// Throws Error{kInvalidArgument} for a positional that is empty after parsing.
   void require(const std::string& name, const std::string& value) const;
   void require(const std::string& name, const std::vector<std::string>& values) const;

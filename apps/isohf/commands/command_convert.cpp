@@ -403,12 +403,9 @@ int run(ConvertCommandOptions options) {
 }  // namespace
 
 int command_convert(const Arguments& arguments) {
-  const bool is_shard = std::any_of(arguments.begin(), arguments.end(), [](const std::string& argument) {
-    return argument == "--plan" || argument.starts_with("--plan=");
-  });
-  if (is_shard) return convert_shard_of(arguments);
-  std::optional<ConvertCommandOptions> options = parse_convert(arguments, ConvertLine::kConvert);
+  std::optional<ConvertCommandOptions> options = parse_convert(arguments);
   if (!options) return kExitDone;
+  if (options->shard) return convert_shard_of(std::move(*options));
   return options->each.each ? run_each(*options) : run(std::move(*options));
 }
 

@@ -14,12 +14,17 @@
 #include "options/options_common.h"
 #include "output/json_output.h"
 #include "output/output_kinds.h"
-#include "output/part_output.h"
 #include "output/standard_output.h"
 #include "raster/restored_raster.h"
 
 namespace isohf::cli {
 namespace {
+
+/// "columns 0 to 39, rows 0 to 11".
+std::string describe_tiles(const TileRange& tiles) {
+  return fmt::format("columns {} to {}, rows {} to {}", tiles.first.column, tiles.end.column - 1, tiles.first.row,
+                     tiles.end.row - 1);
+}
 
 constexpr const char* kDiffFooter =
     R"(Tiles are compared by the digests that the archives state, so that none is decoded. Exit code 3 says that something
@@ -73,7 +78,7 @@ ordered_json document_of(const DiffCommand& options, const ArchiveDifference& fo
                        {"metadata", members},
                        {"same_lattice", found.why_other_lattice.empty()},
                        {"why_other_lattice", found.why_other_lattice},
-                       {"tiles_compared", found.compared.count()},
+                       {"tiles_compared", found.tiles_same + found.tiles_differing},
                        {"tiles_same", found.tiles_same},
                        {"tiles_differing", found.tiles_differing},
                        {"only_in_first", found.only_first},

@@ -12,7 +12,6 @@
 #include "commands/command.h"
 #include "commands/export_tiles.h"
 #include "formats/decorate/cropped_source.h"
-#include "isohf/archive/metadata/part_record.h"
 #include "isohf/base/file.h"
 #include "isohf/error.h"
 #include "isohf/restore/sample_grids.h"
@@ -122,8 +121,7 @@ struct ExportGrid {
 
 ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
   const Metadata& metadata = archive.metadata();
-  const WorldBounds ground =
-      options.bbox ? ground_in_box(archive, *options.bbox, AcrossEnds::kGoesOn) : ground_here(metadata);
+  const WorldBounds ground = options.bbox ? ground_in_box(archive, *options.bbox, AcrossEnds::kGoesOn) : metadata.valid;
   const bool area = samples_are_areas(metadata);
   const auto& asked = options.bbox;
   const auto box =
@@ -233,8 +231,7 @@ class Exporter {
   /// another format has none, as its source had.
   [[nodiscard]] bool says_place() const {
     const RasterKind kind = raster_kind(options_.raster.output);
-    return grid_.cut.asked || options_.bbox || part_record(archive_.metadata()) || kind == RasterKind::kAsc ||
-           kind == RasterKind::kFlt;
+    return grid_.cut.asked || options_.bbox || kind == RasterKind::kAsc || kind == RasterKind::kFlt;
   }
   Job job(const char* stage) {
     Job made = job_from(options_.work, display_);

@@ -20,9 +20,9 @@ namespace isohf::cli {
 namespace {
 
 constexpr const char* kExtractFooter =
-    R"(Tiles are copied as they are, with their textures and shadow seeds, under their names and on their lattice; coarse
-planes are made anew. Parts that make up the whole give its bytes again, residuals included: isohf merge. The tiles of a
-coarse plane become an archive of their own, without textures and seeds.
+    R"(The result is an archive like any other. Tiles and textures are copied as they are, and every place keeps its
+elevation; coarse planes, shadow seeds and statistics are made from them. Residuals are left out. The tiles of a
+coarse plane become an archive without textures and seeds.
 
 Examples:
   isohf extract land.isohf -o valley.isohf --bbox 6.5,45,7,45.5
@@ -45,8 +45,8 @@ std::optional<ExtractCommand> parse_extract(const Arguments& arguments) {
   CommandLine line("extract", "Cuts an archive: some of its tiles become an archive of their own.");
   line.group("Arguments");
   line.positional("ARCHIVE", "-i,--input", "Archive to cut", options.archive);
-  line.option("-o,--output", "PART", "Archive to write", options.output);
-  line.flag("--overwrite", "Replace PART where it exists", options.overwrite);
+  line.option("-o,--output", "OUTPUT", "Archive to write", options.output);
+  line.flag("--overwrite", "Replace OUTPUT where it exists", options.overwrite);
   line.option("--bbox", "W,S,E,N", "All tiles that touch this rectangle, in the units of the source's reference system",
               [&](const std::string& text) { options.bbox = bounding_box_from_string(text); });
   line.option("--tiles", "A:B,C:D", "Columns A to B-1 and rows C to D-1 of tiles, counted from 0 in the North-West",
@@ -60,7 +60,7 @@ std::optional<ExtractCommand> parse_extract(const Arguments& arguments) {
   line.footer(kExtractFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
-  line.require("PART (-o)", options.output);
+  line.require("OUTPUT (-o)", options.output);
   if (!options.bbox && !options.tiles && options.plane == 0) {
     throw Error(ErrorCode::kInvalidArgument, "extract: which tiles? Give --bbox W,S,E,N, --tiles A:B,C:D or --plane K");
   }
@@ -78,16 +78,10 @@ int command_extract(const Arguments& arguments) {
     const TileRange here = plane_tiles_of(archive, options->plane);
     if (!options->bbox) return here;
     const TileGrid grid = archive.metadata().plane_grid(options->plane);
-    const TileRange touched =
-        intersection(tiles_touching(grid, ground_in_box(archive, *options->bbox, AcrossEnds::kRefused)), here);
-    if (touched.is_empty()) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  options->archive + ": is a part of its land, and holds no tile that --bbox touches");
-    }
-    return touched;
+    return tiles_touching(grid, ground_in_box(archive, *options->bbox, AcrossEnds::kRefused));
   }();
   return print_part(options->output, options->common, options->work, [&](const Job& job) {
-    return extract_plane(options->archive, options->output, options->plane, tiles,
+    return extract_tiles(options->archive, options->output, options->plane, tiles,
                          {options->overwrite, options->common.strict}, job);
   });
 }

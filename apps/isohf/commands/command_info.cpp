@@ -12,7 +12,7 @@
 #include "commands/command.h"
 #include "isohf/archive.h"
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/metadata/part_record.h"
+#include "isohf/archive/metadata/shard_record.h"
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/error.h"
@@ -29,7 +29,6 @@
 #include "options/source_size.h"
 #include "output/accuracy_output.h"
 #include "output/json_output.h"
-#include "output/part_output.h"
 #include "output/raster_info.h"
 #include "output/standard_output.h"
 
@@ -223,18 +222,6 @@ std::string describe_planes(const ArchiveReader& archive, std::uint64_t tile_byt
                      100.0 * static_cast<double>(bytes) / static_cast<double>(tile_bytes));
 }
 
-/// Which tiles of a whole are here, and on what ground.
-std::string describe_part(const Metadata& metadata, const TileRange& here) {
-  const TileGrid& grid = metadata.grid;
-  const auto edge = [](std::int64_t tile, double extent) { return static_cast<double>(tile) * extent; };
-  const auto part = part_record(metadata);
-  return fmt::format(
-      "{} of a whole, x {:.6g}..{:.6g}, z {:.6g}..{:.6g}{}", describe_tiles(here),
-      edge(here.first.column, grid.extent_x()), edge(here.end.column, grid.extent_x()),
-      edge(here.first.row, grid.extent_z()), edge(here.end.row, grid.extent_z()),
-      part && part->shard ? fmt::format("; shard {} of {}", part->shard->number, part->shard->shards) : "");
-}
-
 std::string describe_archive(const ArchiveReader& archive) {
   const Metadata& metadata = archive.metadata();
   const TileGrid& grid = metadata.grid;
@@ -252,13 +239,15 @@ std::string describe_archive(const ArchiveReader& archive) {
 
   say("archive",
       fmt::format("{}: {}, written by {}", archive.path(), describe_bytes(archive.size_bytes()), metadata.producer));
-  const TileRange here = tiles_of(metadata);
-  const std::int64_t elsewhere = grid.tile_count() - here.count();
-  say("tiles", fmt::format("{} x {} = {}, {} stored, {} wholly void{}", grid.tile_columns(), grid.tile_rows(),
+  const auto shard = shard_record(metadata);
+  const std::int64_t tiles = shard ? (shard->end_row - shard->first_row) * grid.tile_columns() : grid.tile_count();
+  say("tiles", fmt::format("{} x {} = {}, {} stored, {} wholly void", grid.tile_columns(), grid.tile_rows(),
                            describe_count(grid.tile_count()), describe_count(metadata.tiles_stored),
-                           describe_count(here.count() - metadata.tiles_stored),
-                           elsewhere > 0 ? fmt::format(", {} not in this part", describe_count(elsewhere)) : ""));
-  if (elsewhere > 0) say("part", describe_part(metadata, here));
+                           describe_count(tiles - metadata.tiles_stored)));
+  if (shard) {
+    say("shard", fmt::format("{} of {}, rows {} to {} of tiles; isohf merge joins them", shard->number, shard->count,
+                             shard->first_row, shard->end_row - 1));
+  }
   say("tile shape", fmt::format("{}x{} (C x R), {} levels, aspect {:.5f}, {} triangles", shape.columns(), shape.rows(),
                                 shape.levels(), triangle_aspect(grid), describe_count(shape.triangle_count())));
   if (metadata.planes.count > 0) say("planes", describe_planes(archive, derived.tile_bytes));
@@ -345,7 +334,7 @@ int describe_one(const InfoOptions& options, const std::string& input, bool is_o
     throw Error(ErrorCode::kInvalidArgument,
                 "info: " + options.for_rasters + " is for rasters, " + input + " is an archive");
   }
-  const ArchiveReader archive = open_archive(input);
+  const ArchiveReader archive = open_archive(input, ArchiveReader::Shards::kRead);
   print_warnings(archive.warnings());
   if (options.common.json) {
     print_json(archive, options.tiles, is_one_of_many);

@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "commands/command.h"
-#include "commands/shards.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "options/describe.h"
@@ -36,7 +34,6 @@ Examples:
   isohf plan --shape 212x243
   isohf plan dem.tif --density 0.866
   isohf plan tiles/                   what many rasters make together
-  isohf plan dem.tif --write land.plan --shards 16     one conversion on many machines
   isohf plan --table1                 the paper's Table 1 with true aspects)";
 
 struct PlanOptions {
@@ -74,17 +71,11 @@ std::optional<PlanOptions> parse_plan(const Arguments& arguments) {
   add_geoid_option(line, options.geoid);
   add_source_options(line, options.open);
   add_mosaic_options(line, options.inputs);
-  line.group("Many machines");
-  line.option("--write", "FILE",
-              "Write a plan for isohf convert --plan, and isohf merge; takes all options of isohf convert",
-              [](const std::string&) {});
-  line.option("--shards", "N", "With --write: cut the work into N shards", [](const std::string&) {});
   add_common_options(line, options.common);
   line.footer(kPlanFooter);
   if (!line.parse(arguments)) return std::nullopt;
   options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, "plan: " + why); };
-  if (line.given("--shards")) refuse("--shards needs --write FILE");
   if (options.inputs.names.empty()) {
     const std::string option = line.first_given({"Lattice", "Ground", "Input", "Several inputs"});
     if (!option.empty()) refuse(option + " needs an INPUT");
@@ -213,10 +204,6 @@ int run(const PlanOptions& options) {
 }  // namespace
 
 int command_plan(const Arguments& arguments) {
-  const bool writes = std::any_of(arguments.begin(), arguments.end(), [](const std::string& argument) {
-    return argument == "--write" || argument.starts_with("--write=");
-  });
-  if (writes) return write_plan(arguments);
   const std::optional<PlanOptions> options = parse_plan(arguments);
   return options ? run(*options) : static_cast<int>(kExitDone);
 }

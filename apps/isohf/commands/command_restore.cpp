@@ -138,10 +138,10 @@ SampleGrid grid_of_other(const RestoreOptions& options, const Metadata& metadata
 SampleGrid asked_grid(const RestoreOptions& options, ArchiveReader& archive) {
   const RasterOptions& raster = options.raster;
   const Metadata& metadata = archive.metadata();
-  if (!raster.system.empty()) return asked_grid_in_system(raster, archive, ground_here(metadata), std::nullopt, false);
+  if (!raster.system.empty()) return asked_grid_in_system(raster, archive, metadata.valid, std::nullopt, false);
   if (!options.like.empty()) return grid_of_other(options, metadata);
   if (!raster.size && !raster.spacing) return natural_grid(metadata);
-  return grid_over(ground_here(metadata), samples_are_areas(metadata), raster.size, spacing_in_world(raster, metadata));
+  return grid_over(metadata.valid, samples_are_areas(metadata), raster.size, spacing_in_world(raster, metadata));
 }
 
 struct Restored {

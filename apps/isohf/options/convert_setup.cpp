@@ -55,6 +55,7 @@ Examples:
   isohf convert N4*E00*.hgt alps.isohf               many inputs form one surface
   isohf convert tiles/ -o land.isohf --require-complete
   isohf convert heights.exr h.isohf --channel R --z-scale 1200 --sample-spacing 2
+  isohf convert tiles/ -o part-3.isohf --shard 3/64 --z-range -100:5000    one of many machines
   isohf plan dem.tif                  the same options without writing: see what comes out
   isohf convert --each tiles/ --recursive --out-dir archives --keep-going    one of each
   isohf convert --each tiles/ --recursive --out-dir archives --resume        goes on)";
@@ -82,20 +83,41 @@ void take_output(std::vector<std::string> names, ConvertCommandOptions& options)
 }
 
 /// What belongs to --each alone, and what has no meaning for many archives.
-void check_each_options(const CommandLine& line, const ConvertCommandOptions& options, bool is_plan) {
+void check_each_options(const CommandLine& line, const ConvertCommandOptions& options) {
   const auto refuse = [](const std::string& why) {
     throw Error(ErrorCode::kInvalidArgument, {"convert", why, "", ""});
   };
   for (const char* option : {"--out-dir", "--skip-existing", "--keep-going"}) {
     if (!options.each.each && line.given(option)) refuse(std::string(option) + " needs --each");
   }
-  for (const char* option : {"--each", "--report"}) {
-    if (is_plan && line.given(option)) refuse(std::string(option) + " has no place in a plan");
-  }
   if (!options.each.each) return;
   if (options.each.folder.empty()) refuse("--each needs --out-dir DIR, where the archives go");
   for (const char* option : {"--output", "--dry-run", "--source-name", "--report", "--overlap", "--require-complete"}) {
     if (line.given(option)) refuse(fmt::format("{} is for one archive, --each makes many; leave one out", option));
+  }
+}
+
+/// "3/64".
+ShardNumber shard_from_string(const std::string& text) {
+  const std::size_t slash = text.find('/');
+  if (slash == std::string::npos) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("found \"{}\", must be K/N, as in 3/16", text));
+  }
+  return {static_cast<int>(parse_whole_number(text.substr(0, slash), 1, 1000000)),
+          static_cast<int>(parse_whole_number(text.substr(slash + 1), 1, 1000000))};
+}
+
+void check_shard_options(const CommandLine& line, const ConvertCommandOptions& options) {
+  const auto refuse = [](const std::string& why) {
+    throw Error(ErrorCode::kInvalidArgument, {"convert", why, "", ""});
+  };
+  for (const char* option : {"--each", "--dry-run", "--resume", "--max-error", "--report"}) {
+    if (line.given(option)) refuse(fmt::format("{} has no place with --shard", option));
+  }
+  if (!options.convert.z_range && options.convert.code_type != CodeType::kF32) {
+    refuse(
+        "--shard needs --z-range MIN:MAX, or --type f32, as no shard sees all elevations; isohf info --stats INPUT "
+        "prints their range");
   }
 }
 
@@ -107,42 +129,28 @@ void share_memory(ConvertCommandOptions& options) {
   options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, options.work.memory_bytes / 3);
 }
 
-std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments, ConvertLine kind) {
-  const bool is_plan = kind == ConvertLine::kPlan;
+std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
   ConvertCommandOptions options;
   bool no_planes = false;
   std::optional<double> sun_min_deg;
   std::vector<std::string> names;
-  CommandLine line(is_plan ? "plan" : "convert",
-                   "Turns rasters of elevations into an archive of isometric heightfield tiles.");
+  CommandLine line("convert", "Turns rasters of elevations into an archive of isometric heightfield tiles.");
   line.group("Arguments");
-  if (is_plan) {
-    line.positionals("INPUT...", "Rasters of elevations, as isohf convert takes them", names);
-    line.option("--write", "FILE", "The plan to write", options.plan);
-    line.option("--shards", "N", "Cut the work into N shards", [&](const std::string& text) {
-      options.shards = static_cast<int>(parse_whole_number(text, 1, 1000000));
-    });
-    line.flag("--overwrite", "Replace FILE where it exists", options.convert.overwrite);
-    line.repeated("-i,--input", "INPUT", "An input, before those without a name; may be given again",
-                  options.inputs.names);
-  } else {
-    line.positionals("INPUT... OUTPUT",
-                     "Rasters of elevations: files, folders, \"patterns*\" and @lists, which form one source; then the "
-                     "archive to write, NAME.isohf",
-                     names);
-    line.repeated("-i,--input", "INPUT", "An input, before those without a name; may be given again",
-                  options.inputs.names);
-    line.option("-o,--output", "OUTPUT", "The archive to write; then all others are inputs", options.output);
-    line.flag("--overwrite", "Replace OUTPUT where it exists", options.convert.overwrite);
-    line.flag("--resume", "Continue OUTPUT.part of an interrupted run, after checking what is there",
-              options.convert.resume);
-    line.flag("--dry-run", "Print the plan and write nothing, as isohf plan INPUT does", options.dry_run);
-    add_each_options(line, options.each);
-
-    line.option("--plan", "PLAN", "Take INPUT and all options from a plan of isohf plan --write", options.plan);
-    line.option("--shard", "K/N", "With --plan: make the Kth of its N shards",
-                [](const std::string&) { throw Error(ErrorCode::kInvalidArgument, "needs --plan PLAN"); });
-  }
+  line.positionals("INPUT... OUTPUT",
+                   "Rasters of elevations: files, folders, \"patterns*\" and @lists, which form one source; then the "
+                   "archive to write, NAME.isohf",
+                   names);
+  line.repeated("-i,--input", "INPUT", "An input, before those without a name; may be given again",
+                options.inputs.names);
+  line.option("-o,--output", "OUTPUT", "The archive to write; then all others are inputs", options.output);
+  line.flag("--overwrite", "Replace OUTPUT where it exists", options.convert.overwrite);
+  line.flag("--resume", "Continue OUTPUT.part of an interrupted run, after checking what is there",
+            options.convert.resume);
+  line.flag("--dry-run", "Print the plan and write nothing, as isohf plan INPUT does", options.dry_run);
+  line.option("--shard", "K/N",
+              "Make shard K of N, some rows of tiles; isohf merge joins them. Needs --z-range, or --type f32",
+              [&](const std::string& text) { options.shard = shard_from_string(text); });
+  add_each_options(line, options.each);
   add_source_options(line, options.open);
   add_mosaic_options(line, options.inputs);
   line.option("--source-name", "NAME",
@@ -195,17 +203,15 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments, C
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
-  check_each_options(line, options, is_plan);
-  if (options.each.each || is_plan) {
+  check_each_options(line, options);
+  if (options.shard) check_shard_options(line, options);
+  if (options.each.each) {
     options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
   } else {
     take_output(std::move(names), options);
   }
   line.require("INPUT", options.inputs.names);
-  if (is_plan)
-    line.require("FILE (--write)", options.plan);
-  else if (!options.dry_run && !options.each.each)
-    line.require("OUTPUT", options.output);
+  if (!options.dry_run && !options.each.each) line.require("OUTPUT", options.output);
   if (options.convert.clamp_range && !options.convert.z_range) {
     throw Error(ErrorCode::kInvalidArgument, "convert: --clamp-range needs --z-range MIN:MAX");
   }

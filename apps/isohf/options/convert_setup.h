@@ -9,6 +9,7 @@
 #include "commands/convert_each.h"
 #include "isohf/convert.h"
 #include "isohf/raster.h"
+#include "isohf/shards.h"
 #include "options/options_common.h"
 #include "options/options_ground.h"
 #include "options/options_source.h"
@@ -30,17 +31,14 @@ struct ConvertCommandOptions {
   GeoidRequest geoid;
   bool spacing_in_metres = false;
   bool dry_run = false;
-  int shards = 1;  ///< of plan --write
-  std::string plan;
+  std::optional<ShardNumber> shard;
   EachOptions each;
   /// Measure the archive against the input; the file for the report, "-" for none beside the summary.
   std::optional<std::string> report;
 };
 
-/// Whose line it is: convert's, or that of plan --write, whose names are all inputs.
-enum class ConvertLine { kConvert, kPlan };
 /// nullopt: help was printed. Throws Error{kInvalidArgument}.
-[[nodiscard]] std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments, ConvertLine kind);
+[[nodiscard]] std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments);
 /// What is packed shares the memory with what is read from it, and with the tiles.
 void share_memory(ConvertCommandOptions& options);
 

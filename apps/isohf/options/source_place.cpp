@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/georeference/reference_system.h"
+#include "isohf/archive/metadata/cut_record.h"
 #include "isohf/error.h"
 #include "isohf/surface.h"
 #include "options/describe.h"
@@ -57,6 +58,12 @@ std::optional<SourcePlace> source_place(const Georeference& place, std::int64_t 
 
 std::optional<SourcePlace> source_place(const Metadata& metadata) {
   const SourceRecord& source = metadata.source;
+  if (is_cut(metadata) && !is_warped(metadata)) {
+    const SampleGrid grid = natural_grid(metadata);
+    const auto there = grid_georeference(metadata, grid);
+    if (!there) return std::nullopt;
+    return source_place(*there, grid.width, grid.height, source.registration == Registration::kArea, std::nullopt);
+  }
   Georeference place = source_georeference(source);
   place.has_origin = place.has_origin && source.crs_spacing_x > 0.0 && source.crs_spacing_y > 0.0;
   return source_place(place, source.width, source.height, source.registration == Registration::kArea, source.ground);

@@ -5,9 +5,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "isohf/archive/metadata/cut_record.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
-#include "isohf/restore/sample_grids.h"
+#include "isohf/surface.h"
 #include "options/describe.h"
 
 namespace isohf::cli {
@@ -26,11 +27,10 @@ std::uint64_t bytes_of_type(const std::string& sample_type) {
 
 SizeBesideSource::SizeBesideSource(const Metadata& metadata, std::uint64_t tile_bytes) {
   const SourceRecord& source = metadata.source;
-  const auto area = [](const WorldBounds& ground) { return (ground.x1 - ground.x0) * (ground.z1 - ground.z0); };
-  const double share = area(ground_here(metadata)) / area(metadata.valid);
-  source_samples = static_cast<std::uint64_t>(source.width) * static_cast<std::uint64_t>(source.height);
-  is_part = share < 1.0;
-  if (is_part) source_samples = static_cast<std::uint64_t>(std::round(share * static_cast<double>(source_samples)));
+  is_part = is_cut(metadata);
+  const SampleGrid samples = natural_grid(metadata);
+  source_samples = is_part ? static_cast<std::uint64_t>(samples.width) * static_cast<std::uint64_t>(samples.height)
+                           : static_cast<std::uint64_t>(source.width) * static_cast<std::uint64_t>(source.height);
   source_bytes = source_samples * bytes_of_type(source.sample_type);
   if (source_samples > 0) {
     bits_per_source_sample = 8.0 * static_cast<double>(tile_bytes) / static_cast<double>(source_samples);

@@ -69,14 +69,4 @@ void check_report_output(const std::vector<std::string>& inputs, const std::stri
   check_output_file(inputs, output, overwrite);
 }
 
-void check_plan_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite) {
-  const std::string place = check_output_place(inputs, output);
-  const std::vector<std::byte> head = named(output, [&] { return head_of_file(place, 64); });
-  const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
-  if (!text.empty() && text.find("\"isohf-plan\"") == std::string_view::npos) {
-    refuse(output, "no plan of isohf, which alone is replaced by one", "choose another name");
-  }
-  check_output_file(inputs, output, overwrite);
-}
-
 }  // namespace isohf::cli

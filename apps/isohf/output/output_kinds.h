@@ -14,7 +14,5 @@ void check_archive_output(const std::vector<std::string>& inputs, const std::str
 void check_raster_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite);
 /// A report, which replaces nothing but reports.
 void check_report_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite);
-/// A plan for many machines, which replaces nothing but such.
-void check_plan_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite);
 
 }  // namespace isohf::cli

@@ -6,7 +6,6 @@
 #include <limits>
 #include <map>
 
-#include "isohf/parts.h"
 
 namespace isohf::view {
 namespace {
@@ -125,17 +124,15 @@ void verify_mesh(const SharedGeometry& shared, ViewReport& report) {
 ViewReport verify_view(const TileSource& source, const IndexArrays& arrays, const ViewChecks& options) {
   const TileGrid& grid = source.grid();
   const isohf::TileRange all{{0, 0}, {grid.tile_columns(), grid.tile_rows()}};
-  const isohf::TileRange here = source.metadata() != nullptr ? tiles_of(*source.metadata()) : all;
   ViewReport report;
-  report.is_part = !(here == all);
   const SharedGeometry shared(grid.shape(), arrays);
   MeshOracle oracle(grid.shape());
   TileProbe probe(grid, shared, source.scale().scale);
-  const CheckContext context{source, shared, oracle, probe, options, here, report};
+  const CheckContext context{source, shared, oracle, probe, options, report};
   verify_mesh(shared, report);
   verify_tiles(context);
-  // Tiles that disagree shade each other in two ways, and so do those that are elsewhere.
-  if (options.shadows && !report.is_part && report.passed()) verify_shadows(context);
+  // Tiles that disagree shade each other in two ways.
+  if (options.shadows && report.passed()) verify_shadows(context);
   return report;
 }
 

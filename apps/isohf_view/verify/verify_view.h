@@ -40,7 +40,6 @@ struct ViewReport {
   std::int64_t vertices = 0;
   std::int64_t shared_vertices = 0;  ///< compared between tiles
   std::int64_t shadow_vertices = 0;
-  bool is_part = false;          ///< of an archive: shadows from its other tiles are not known, and not looked at
   std::vector<double> suns_deg;  ///< that shadows were looked at for, from either side
   double worst_shadow = 0.0;     ///< codes
   double worst_share = 0.0;      ///< of the sun
@@ -78,7 +77,6 @@ struct CheckContext {
   MeshOracle& oracle;
   TileProbe& probe;
   const ViewChecks& options;
-  isohf::TileRange here;  ///< of an archive that is a part: nothing is said of the others
   ViewReport& report;
 
   /// True where a tile must be drawn with the shaders that discard voids.

@@ -63,15 +63,19 @@ struct MemberTable {
 /// Decodes the tiles of an archive in any order, from any number of threads at once. Nothing in the file is trusted.
 class ArchiveReader {
  public:
+  /// Whether a shard is read, which is no archive before it was merged with the others.
+  enum class Shards { kRefused, kRead };
+
   /// Opens a file. Opening reads its tail and the metadata, no tile and no index but where its pages are; what is read
   /// later is read from the file: nothing grows with it. Throws Error{kIo} where the file cannot be opened, Error{kCorrupt} or
-  /// Error{kUnsupported} naming member and byte offset where it is no archive that this build can read.
-  explicit ArchiveReader(const std::string& path);
+  /// Error{kUnsupported} naming member and byte offset where it is no archive that this build can read, and
+  /// Error{kInvalidArgument} for a shard that is refused.
+  explicit ArchiveReader(const std::string& path, Shards shards = Shards::kRefused);
 
   /// The same from anything that reads a range of bytes; `name` is what messages call it. Opening reads the last 256
   /// KiB, and as much again where a longer directory stands there; pages of the index are read when they are asked for,
   /// and some MiB of them kept, so that a tile mostly costs one range.
-  ArchiveReader(std::shared_ptr<const ByteSource> source, const std::string& name);
+  ArchiveReader(std::shared_ptr<const ByteSource> source, const std::string& name, Shards shards = Shards::kRefused);
   ~ArchiveReader();
   ArchiveReader(ArchiveReader&&) noexcept;
   ArchiveReader(const ArchiveReader&) = delete;

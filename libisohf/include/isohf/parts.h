@@ -12,14 +12,10 @@
 #include "isohf/surface.h"
 #include "isohf/tile_range.h"
 
-/// Archives that are cut, joined and compared without coding a tile again (docs/cluster.md). A part is an archive on the
-/// whole's lattice, tiles under the whole's names, that says in its metadata which tiles it holds; of the others it says
-/// nothing.
+/// Archives that are cut and compared without coding a tile again.
 
 namespace isohf {
 
-/// The tiles that an archive is to hold: a part's, or all of the grid. Throws Error{kCorrupt}.
-[[nodiscard]] TileRange tiles_of(const Metadata& metadata);
 /// The tiles that a rectangle of the world touches. Throws Error{kInvalidArgument} where there are none.
 [[nodiscard]] TileRange tiles_touching(const TileGrid& grid, const WorldBounds& bounds);
 
@@ -29,43 +25,26 @@ struct PartOptions {
   bool strict = false;  ///< a warning is an Error{kWarning}, and nothing is written
 };
 
-/// What extract_tiles() or merge_archives() wrote.
+/// What extract_tiles() or merge_shards() wrote.
 struct PartSummary {
-  TileRange tiles;             ///< that are to be there
-  bool is_whole = false;       ///< these are all of the grid
-  bool same_as_whole = false;  ///< the archive that the parts were cut from came out again
   std::int64_t tiles_stored = 0;
   std::uint64_t archive_bytes = 0;
   std::string content_sha256;
   std::vector<Warning> warnings;
 };
 
-/// Writes some tiles of an archive as one of their own. Tiles, their textures and their seeds are copied byte for byte,
-/// coarse planes are made anew; residual members belong to tiles of the first column, and come along with these (the
-/// samples come back once the parts are joined). Stage "tiles". Memory: a batch of tiles, and
-/// what planes need. Throws Error{kInvalidArgument} where `tiles` reach beyond the archive, where it was
-/// repacked by another tool, and where `output` exists without overwrite; Error{kCorrupt} for damage.
-PartSummary extract_tiles(const std::string& archive, const std::string& output, const TileRange& tiles,
-                          const PartOptions& options = {}, const Job& job = {});
-
-/// The tiles of a coarse plane that stand above those that an archive is to hold; 0: these. Throws
-/// Error{kInvalidArgument} where there is no such plane.
+/// All tiles of plane 0, or of a coarse plane, 1 to metadata().planes.count. Throws Error{kInvalidArgument} if there is no
+/// such plane.
 [[nodiscard]] TileRange plane_tiles_of(const ArchiveReader& archive, int plane);
-/// The same of tiles of a coarse plane, 1 to metadata().planes.count, which become those of an archive of their own: a
-/// look from afar, whose lattice has every stride^plane-th vertex. They are copied, and decoded for their statistics and
-/// the planes above. Beyond the whole's last tiles it goes on level. Seeds, textures and residuals tell of finer tiles
-/// and stay behind. 0: extract_tiles().
-PartSummary extract_plane(const std::string& archive, const std::string& output, int plane, const TileRange& tiles,
-                          const PartOptions& options = {}, const Job& job = {});
 
-/// Joins archives that share a lattice; where several hold a tile, the last of them gives it. What they hold together
-/// must be a rectangle of tiles. Parts cut from one archive, or shards of one plan, give its bytes again; of others the
-/// tiles are decoded, their common edges compared, seeds and statistics made anew. Stages "check", "tiles".
-/// Before anything is written, every archive is looked at, all of its bytes too: Error{kInvalidArgument, kCorrupt} names
-/// each that is damaged, lies on another lattice or belongs to something else, and tiles that none holds; all of them
-/// in one message, a line each.
-PartSummary merge_archives(const std::vector<std::string>& archives, const std::string& output,
-                           const PartOptions& options = {}, const Job& job = {});
+/// Writes tiles of a plane as an archive of their own: `tiles` of plane 0, or of a coarse plane, which has every
+/// stride^plane-th vertex. The world of the new archive begins at the first tile, and every place in a reference system
+/// keeps its elevation. Tiles and textures are copied byte for byte; coarse planes, shadow seeds and statistics are made
+/// from them. A coarse plane has no textures and seeds. Residuals are left out, with a warning. Stage "tiles".
+/// Throws Error{kInvalidArgument} if `tiles` reach beyond the plane, if the archive was repacked by
+/// another tool, and if `output` exists without overwrite; Error{kCorrupt} for damage.
+PartSummary extract_tiles(const std::string& archive, const std::string& output, int plane, const TileRange& tiles,
+                          const PartOptions& options = {}, const Job& job = {});
 
 /// What two archives have in another way.
 struct ArchiveDifference {
@@ -76,7 +55,6 @@ struct ArchiveDifference {
   };
   std::vector<Member> metadata;
   std::string why_other_lattice;  ///< one clause; the rest is then not looked at
-  TileRange compared;             ///< tiles that both are to hold
   std::int64_t tiles_same = 0;    ///< of them; void in both, too
   std::int64_t tiles_differing = 0;
   std::int64_t only_first = 0;  ///< of these, stored in one alone
@@ -97,8 +75,8 @@ struct ArchiveDifference {
   [[nodiscard]] bool same_tiles() const { return why_other_lattice.empty() && tiles_differing == 0; }
 };
 
-/// Compares metadata, and tiles that both are to hold by their stored digests: none is decoded but those that have no digest
-/// (repacked archives), and with `surface` those that differ. Stage "compare". Memory is bounded.
+/// Compares metadata, and tiles by their stored digests: none is decoded but those that have no digest (repacked archives), and
+/// with `surface` those that differ. Stage "compare". Memory is bounded.
 [[nodiscard]] ArchiveDifference diff_archives(const std::string& first, const std::string& second, bool surface = false,
                                               const Job& job = {});
 

@@ -14,6 +14,7 @@
 #include "isohf/archive/codec/tile_decoder.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/metadata/shard_record.h"
 #include "isohf/archive/tile_locator.h"
 #include "isohf/base/source_bytes.h"
 #include "isohf/error.h"
@@ -97,6 +98,7 @@ struct ArchiveReader::State {
   mutable std::vector<MemberTable> tables;
 
   void open();
+  void refuse_shard() const;
   /// A member's data, its local header held against what is stated, in one range.
   [[nodiscard]] SourceBytes checked_data(const ZipMember& member, std::uint64_t data_offset,
                                          std::size_t& header_bytes) const;
@@ -151,6 +153,16 @@ void ArchiveReader::State::open() {
   if (tiles->by_directory()) {
     warnings.emplace_back("index and ZIP directory do not agree, as after repacking; tiles are found by the directory");
   }
+}
+
+void ArchiveReader::State::refuse_shard() const {
+  named([&] {
+    if (const auto shard = shard_record(*metadata)) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("is shard {} of {}; merge the shards first: isohf merge SHARD... -o OUTPUT",
+                              shard->number, shard->count));
+    }
+  });
 }
 
 SourceBytes ArchiveReader::State::checked_data(const ZipMember& member, std::uint64_t data_offset,
@@ -256,10 +268,15 @@ std::optional<MemberEntry> ArchiveReader::State::find_in_tables(const std::strin
       wanted, entry.offset_bytes, entry.compressed_bytes, entry.payload_bytes, entry.payload_crc32, record->deflated};
 }
 
-ArchiveReader::ArchiveReader(const std::string& path) : state_(std::make_unique<State>(open_file_source(path), path)) {}
+ArchiveReader::ArchiveReader(const std::string& path, Shards shards)
+    : state_(std::make_unique<State>(open_file_source(path), path)) {
+  if (shards == Shards::kRefused) state_->refuse_shard();
+}
 
-ArchiveReader::ArchiveReader(std::shared_ptr<const ByteSource> source, const std::string& name)
-    : state_(std::make_unique<State>(required(std::move(source), name), name)) {}
+ArchiveReader::ArchiveReader(std::shared_ptr<const ByteSource> source, const std::string& name, Shards shards)
+    : state_(std::make_unique<State>(required(std::move(source), name), name)) {
+  if (shards == Shards::kRefused) state_->refuse_shard();
+}
 
 ArchiveReader::ArchiveReader(ArchiveReader&&) noexcept = default;
 ArchiveReader::~ArchiveReader() = default;

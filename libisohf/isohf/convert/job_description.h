@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "isohf/archive/metadata/part_record.h"
+#include "isohf/archive/metadata/shard_record.h"
 #include "isohf/convert.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/metadata.h"

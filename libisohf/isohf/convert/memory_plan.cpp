@@ -20,6 +20,11 @@
 namespace isohf {
 namespace {
 
+/// In each thread, of each vertex of a tile: its height and code, and what the encoder works with.
+constexpr double kBytesPerVertex = 24.0;
+/// Of each tile of an archive that is written: index, journal and directory.
+constexpr double kBytesPerTile = 200.0;
+
 constexpr std::uint64_t kMiB = std::uint64_t{1} << 20U;
 
 /// Of a tile that waits to be written.

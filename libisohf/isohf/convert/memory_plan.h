@@ -10,11 +10,6 @@
 
 namespace isohf {
 
-/// In each thread, of each vertex of a tile: its height and code, and what the encoder works with.
-constexpr double kBytesPerVertex = 24.0;
-/// Of each tile of an archive that is written: index, journal and directory.
-constexpr double kBytesPerTile = 200.0;
-
 /// Whether a step and a bound on the rounding leave codes to choose from (docs/decisions/0067).
 [[nodiscard]] inline bool chooses_codes(const ConvertOptions& options) {
   return options.step && options.max_rounding && options.code_type != CodeType::kF32;

@@ -210,14 +210,14 @@ std::int64_t rows_around(const ConvertOptions& options, const ShardWork& shard) 
 
 /// What is beside a shard's own rows.
 TilesAround make_around(const Conversion& conversion, const ShardWork& shard, const ResidualStage* residuals) {
-  RowRange north{shard.first_row, shard.first_row - 1};
-  RowRange south{shard.end_row, shard.end_row - 1};
+  RowRange north{shard.record.first_row, shard.record.first_row - 1};
+  RowRange south{shard.record.end_row, shard.record.end_row - 1};
   const auto reach_over = [&](const RowRange& needed) {
     if (needed.first > needed.last) return;
     north.first = std::max<std::int64_t>(std::min(north.first, needed.first), 0);
     south.last = std::min(std::max(south.last, needed.last), conversion.plan.grid.tile_rows() - 1);
   };
-  if (shard.has_plane_rows) reach_over({shard.first_row - 1, shard.end_row});
+  if (shard.has_plane_rows) reach_over({shard.record.first_row - 1, shard.record.end_row});
   if (residuals != nullptr) reach_over(residuals->tile_rows_needed());
   return {conversion, north, south};
 }
@@ -312,22 +312,6 @@ Plan plan_conversion(const SourceInfo& info, const ConvertOptions& options) {
   return make_plan(info, options.plan);
 }
 
-ShardPlan::Codes find_codes(HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job,
-                            std::vector<Warning>& warnings) {
-  if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
-  const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));
-  const MemoryPlan memory = plan_memory(source, plan, options, job, 0);
-  check_memory(memory, job);
-  source.limit_buffers(memory.source_buffer_bytes);
-  Conversion conversion{source, options, plan, memory, kernel, Prefilter::make(kernel.filter(), options.acquisition),
-                        job};
-  ConvertSummary summary(plan.grid);
-  Arena(job).execute([&] { choose_codes(conversion, summary); });
-  refuse_warnings(summary, options);
-  warnings = std::move(summary.warnings);
-  return {conversion.quantisation, conversion.datum, conversion.height_error, conversion.largest};
-}
-
 ConversionResult run_conversion(HeightSource& source, const Plan& plan, const std::string& output,
                                 const ConvertOptions& options, const Job& job, bool is_retry, const ShardWork* shard) {
   const auto start = std::chrono::steady_clock::now();
@@ -361,9 +345,9 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
   WriterOptions how{options.overwrite, options.resume, job_fingerprint(info, plan, options), coarse, 0,
                     options.code_type};
   if (shard != nullptr) {
-    conversion.first_tile = how.first_tile = shard->first_row * plan.grid.tile_columns();
-    conversion.end_tile = shard->end_row * plan.grid.tile_columns();
-    how.job_fingerprint += fmt::format(" | shard {} of {}", shard->record.number, shard->record.plan);
+    conversion.first_tile = how.first_tile = shard->record.first_row * plan.grid.tile_columns();
+    conversion.end_tile = shard->record.end_row * plan.grid.tile_columns();
+    how.job_fingerprint += fmt::format(" | shard {} of {}", shard->record.number, shard->record.count);
   }
   ArchiveWriter writer(output, plan.grid, how);
   std::optional<PlaneStage> planes;
@@ -373,16 +357,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
   std::optional<LosslessRecord> lossless;
   try {
     Arena(job).execute([&] {
-      if (shard == nullptr) {
-        choose_codes(conversion, summary);
-      } else {
-        conversion.quantisation = shard->codes.quantisation;
-        conversion.datum = shard->codes.datum;
-        conversion.height_error = shard->codes.height_error;
-        conversion.largest = shard->codes.largest;
-        conversion.limits = options.z_range ? CodeLimits{options.z_range->first, options.z_range->second}
-                                            : code_limits(shard->codes.quantisation);
-      }
+      choose_codes(conversion, summary);
       refuse_warnings(summary, options);
       if (options.shadow_seeds) {
         // Lengths of both kinds are compared as metres where both are known to be.
@@ -391,8 +366,8 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
                       known ? 1.0 / info.metres_per_vertical_unit : 1.0,
                       memory.seeds_in_scratch ? ScratchFolder(job.scratch_folder) : std::nullopt);
       }
-      const RowRange rows =
-          shard != nullptr ? RowRange{shard->first_row, shard->end_row - 1} : RowRange{0, plan.grid.tile_rows() - 1};
+      const RowRange rows = shard != nullptr ? RowRange{shard->record.first_row, shard->record.end_row - 1}
+                                             : RowRange{0, plan.grid.tile_rows() - 1};
       if (options.lossless) {
         residuals.emplace(source.as_stored(), plan.frame, plan.grid, conversion.quantisation, conversion.largest, rows,
                           memory.residuals_in_scratch ? ScratchFolder(job.scratch_folder) : std::nullopt);
@@ -413,11 +388,13 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
         if (memory.residuals_in_scratch) give_back_freed_memory();
         const auto read_tile = [&](TileIndex tile) {
           const bool is_beside = around && around->holds(tile);
-          ISOHF_ASSERT(is_beside || shard == nullptr || (tile.row >= shard->first_row && tile.row < shard->end_row));
+          ISOHF_ASSERT(is_beside || shard == nullptr || (tile.row >= rows.first && tile.row <= rows.last));
           return is_beside ? around->codes(tile) : writer.read_tile(tile, conversion.quantisation);
         };
-        lossless = residuals->write(read_tile, memory.members_at_once,
-                                    shard != nullptr ? shard->samples_sha256 : std::nullopt, writer, job);
+        // A shard does not pass all samples.
+        const std::optional<std::string> samples_sha256 =
+            shard != nullptr ? std::optional(hash_of_samples(source.as_stored(), job)) : std::nullopt;
+        lossless = residuals->write(read_tile, memory.members_at_once, samples_sha256, writer, job);
       }
     });
 
@@ -442,15 +419,14 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
     }
     if (lossless) {
       summary.residual_bytes = lossless->residual_bytes;
-      metadata.extensions.emplace_back(shard != nullptr ? kPartLosslessName : kLosslessName,
-                                       format_lossless(*lossless));
+      metadata.extensions.emplace_back(kLosslessName, format_lossless(*lossless));
     }
     if (shard != nullptr) {
-      PartRecord part{{{0, shard->first_row}, {plan.grid.tile_columns(), shard->end_row}}, shard->record};
+      ShardRecord record = shard->record;
       std::vector<double> sums = writer.row_sums();
-      sums.resize(static_cast<std::size_t>(shard->end_row));
-      part.shard->row_sums.assign(sums.begin() + static_cast<std::ptrdiff_t>(shard->first_row), sums.end());
-      metadata.extensions.emplace_back(kPartName, format_part_record(part));
+      sums.resize(static_cast<std::size_t>(record.end_row));
+      record.row_sums.assign(sums.begin() + static_cast<std::ptrdiff_t>(record.first_row), sums.end());
+      metadata.extensions.emplace_back(kShardName, format_shard_record(record));
     }
     ISOHF_ASSERT(writer.next_tile() == plan.grid.tile_count());
     summary.tiles_expected = summary.tiles_written = conversion.end_tile - conversion.first_tile;

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/metadata/part_record.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/handed_in.h"
 #include "isohf/error.h"
@@ -81,22 +80,20 @@ struct GridSampler::Block {
 
 GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTile read_tile,
                          const SampleGrid& samples, RestoreMethod method, const std::optional<TileGrid>& world,
-                         const ScratchFolder& scratch, const std::optional<Turn>& turn,
-                         const std::optional<TileRange>& here)
+                         const ScratchFolder& scratch, const std::optional<Turn>& turn)
     : grid_(grid),
       quantisation_(quantisation),
       samples_(require_samples_near(samples, world.value_or(grid))),
       method_(method),
       end_z_(world.value_or(grid).world_height()),
       tolerance_(world ? kRoundedPlace : kRounding),
-      here_(here.value_or(all_tiles(grid))),
       spline_(grid, method == RestoreMethod::kHex ? columns_of(samples, turn, tolerance_) : std::vector<double>{},
               wraps_x, scratch),
       in_scratch_(scratch.has_value()),
       heights_(static_cast<std::size_t>(samples.width), scratch),
       near_void_(static_cast<std::size_t>(samples.width), scratch) {
   for (const double x : columns_of(samples, turn, tolerance_)) {
-    const TilePoint at = locate({x, 0.0});
+    const TilePoint at = grid_.locate({x, 0.0});
     columns_.push_back(
         {is_inside(x, tolerance_ * samples.spacing_x, world.value_or(grid).world_width()), at.tile.column, at.point.x});
   }
@@ -179,7 +176,7 @@ RowRange GridSampler::lattice_rows_of(std::int64_t row) const {
 
 void GridSampler::read(std::int64_t first, std::int64_t rows, std::span<double> elevations) {
   ISOHF_ASSERT(elevations.size() == static_cast<std::size_t>(rows * samples_.width));
-  const auto tile_row_at = [&](std::int64_t row) { return locate({0.0, world_z(row)}).tile.row; };
+  const auto tile_row_at = [&](std::int64_t row) { return grid_.locate({0.0, world_z(row)}).tile.row; };
   for (std::int64_t row = first; row < first + rows; ++row) tiles_->have(tile_row_at(row));
   if (method_ == RestoreMethod::kHex) {
     const RowRange north = lattice_rows_of(first);
@@ -221,7 +218,7 @@ void GridSampler::read_row(std::int64_t row, Block& block, std::span<double> out
     std::fill(out.begin(), out.end(), kVoid);
     return;
   }
-  const TilePoint at = locate({0.0, z});
+  const TilePoint at = grid_.locate({0.0, z});
   if (method_ != RestoreMethod::kHex) return read_on_triangles(at, block, out);
   const QuinticResponse response = quintic_response(spline_.row_at(std::clamp(z, 0.0, grid_.world_height())));
   bool beside_voids = tiles_->has_voids(at.tile.row);

@@ -29,12 +29,10 @@ class GridSampler {
   /// world    where the surface ends, to a hundredth of a sample, as georeferences are rounded; nullopt: with the grid,
   ///          beyond which a coarse plane's may reach
   /// scratch  keeps tile rows and lattice rows where memory has no room for them
-  /// here     the tiles that there are; nullopt: all
   /// turn     columns that miss the ground are looked for some turns away
   GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTile read_tile,
               const SampleGrid& samples, RestoreMethod method, const std::optional<TileGrid>& world = {},
-              const ScratchFolder& scratch = {}, const std::optional<Turn>& turn = {},
-              const std::optional<TileRange>& here = {});
+              const ScratchFolder& scratch = {}, const std::optional<Turn>& turn = {});
 
   /// What a sampler holds that reads so many rows at once, beside the elevations; an estimate.
   [[nodiscard]] static double memory_bytes(const TileGrid& grid, const SampleGrid& samples, RestoreMethod method,
@@ -65,7 +63,6 @@ class GridSampler {
   void read_row(std::int64_t row, Block& block, std::span<double> out) const;
   void blend_lattice_rows(const QuinticResponse& response, bool beside_voids, Block& block,
                           std::span<double> out) const;
-  [[nodiscard]] TilePoint locate(WorldPoint point) const { return locate_here(grid_, here_, point); }
   [[nodiscard]] double world_z(std::int64_t row) const {
     return samples_.first_z + static_cast<double>(row) * samples_.spacing_z;
   }
@@ -76,7 +73,6 @@ class GridSampler {
   RestoreMethod method_;
   double end_z_;      ///< of the surface, world units
   double tolerance_;  ///< beyond it, samples
-  TileRange here_;
   SplineRows spline_;
   std::vector<Column> columns_;
   std::optional<VertexRows> tiles_;  ///< kHex: all of a row, else those under samples

@@ -156,10 +156,6 @@ std::optional<LosslessRecord> lossless_record(const Metadata& metadata) {
   return record_named(kLosslessName, metadata);
 }
 
-std::optional<LosslessRecord> part_lossless_record(const Metadata& metadata) {
-  return record_named(kPartLosslessName, metadata);
-}
-
 RowRange residual_rows_at(const LosslessRecord& record, std::int64_t all_tile_rows, const RowRange& tile_rows) {
   const std::int64_t members = (record.height + record.rows_per_member - 1) / record.rows_per_member;
   // Member k belongs to row k * all_tile_rows / members.

@@ -20,10 +20,6 @@ namespace isohf {
 
 /// The metadata's member beside the residual members: a LosslessRecord.
 inline constexpr const char* kLosslessName = "lossless";
-/// The same in a part that holds some of these members, of the whole.
-inline constexpr const char* kPartLosslessName = "part_lossless";
-/// As lossless_record(), of a part.
-[[nodiscard]] std::optional<LosslessRecord> part_lossless_record(const Metadata& metadata);
 /// Its JSON text.
 [[nodiscard]] std::string format_lossless(const LosslessRecord& record);
 

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/metadata/part_record.h"
 #include "isohf/base/assert.h"
 #include "isohf/surface/shade/normals.h"
 
@@ -125,11 +124,8 @@ void for_each_tile(const ReadTile& read_tile, TileIndex first, std::int64_t tile
 }
 
 PointSampler::PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile,
-                           std::uint64_t memory_bytes, const std::optional<TileRange>& here)
-    : grid_(grid),
-      quantisation_(quantisation),
-      read_tile_(std::move(read_tile)),
-      here_(here.value_or(all_tiles(grid))) {
+                           std::uint64_t memory_bytes)
+    : grid_(grid), quantisation_(quantisation), read_tile_(std::move(read_tile)) {
   const std::uint64_t bytes = quantisation.type == CodeType::kF32 ? 4 : 2;
   const std::uint64_t tile_bytes = static_cast<std::uint64_t>(grid.shape().stored_vertex_count()) * bytes;
   capacity_ = static_cast<std::size_t>(std::max<std::uint64_t>(1, memory_bytes / tile_bytes));
@@ -191,7 +187,7 @@ std::int64_t PointSampler::tile_under(WorldPoint point) const {
   const double slack = 0.001 * std::min(2.0 * grid_.sigma_x(), grid_.sigma_z());
   const bool is_inside = std::abs(std::clamp(point.x, 0.0, grid_.world_width()) - point.x) <= slack &&
                          std::abs(std::clamp(point.z, 0.0, grid_.world_height()) - point.z) <= slack;
-  return is_inside ? grid_.flat_index(locate(point).tile) : -1;
+  return is_inside ? grid_.flat_index(grid_.locate(point).tile) : -1;
 }
 
 void PointSampler::sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples) {
@@ -204,7 +200,7 @@ void PointSampler::sample(std::span<const WorldPoint> points, std::span<SurfaceS
     TileSurface surface(grid_, quantisation_, codes, scratches.local());
     for (const Run& run : runs) {
       for (std::size_t i = run.first; i < run.end; ++i) {
-        const TilePoint at = locate(points[i]);
+        const TilePoint at = grid_.locate(points[i]);
         samples[i].tile = at.tile;
         surface.sample(at.point, samples[i]);
       }
@@ -221,7 +217,7 @@ void PointSampler::sample(std::span<const WorldPoint> points, std::span<double> 
     const TileSurface surface(grid_, quantisation_, codes, no_scratch);
     for (const Run& run : runs) {
       for (std::size_t i = run.first; i < run.end; ++i) {
-        elevations[i] = surface.elevation(snapped(barycentric(grid_.shape(), locate(points[i]).point)));
+        elevations[i] = surface.elevation(snapped(barycentric(grid_.shape(), grid_.locate(points[i]).point)));
       }
     }
   });

@@ -36,9 +36,7 @@ class PointSampler {
  public:
   /// Keeps at most `memory_bytes` of decoded tiles, and has as much again in hand during a call; one tile in each
   /// thread at least.
-  /// here  the tiles that there are; nullopt: all
-  PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile, std::uint64_t memory_bytes,
-               const std::optional<TileRange>& here = {});
+  PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile, std::uint64_t memory_bytes);
 
   void sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples);
   void sample(std::span<const WorldPoint> points, std::span<double> elevations);
@@ -56,7 +54,6 @@ class PointSampler {
   };
 
   [[nodiscard]] std::int64_t tile_under(WorldPoint point) const;
-  [[nodiscard]] TilePoint locate(WorldPoint point) const { return locate_here(grid_, here_, point); }
   template <typename TileOf, typename Sample>
   void visit(std::size_t points, const TileOf& tile_of, const Sample& sample);
   [[nodiscard]] Codes kept(std::int64_t tile);
@@ -65,7 +62,6 @@ class PointSampler {
   TileGrid grid_;
   Quantisation quantisation_;
   ReadTile read_tile_;
-  TileRange here_;
   std::size_t capacity_;  ///< tiles to keep
   std::mutex mutex_;      ///< of what follows
   std::list<Kept> used_;  ///< last used first

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "isohf/archive/metadata/part_record.h"
+#include "isohf/archive/metadata/cut_record.h"
 #include "isohf/base/handed_in.h"
 #include "isohf/error.h"
 #include "isohf/projection/projected_extent.h"
@@ -384,38 +384,12 @@ SampleGrid source_grid(const SourceRecord& source) {
           source.first_sample_z, source.spacing_x, source.spacing_z};
 }
 
-WorldBounds ground_here(const Metadata& metadata) {
-  const auto record = part_record(metadata);
-  const WorldBounds& all = metadata.valid;
-  if (!record) return all;
-  const TileRange& here = record->tiles;
-  const TileGrid& tiles = metadata.grid;
-  const WorldBounds part{std::max(all.x0, static_cast<double>(here.first.column) * tiles.extent_x()),
-                         std::max(all.z0, static_cast<double>(here.first.row) * tiles.extent_z()),
-                         std::min(all.x1, static_cast<double>(here.end.column) * tiles.extent_x()),
-                         std::min(all.z1, static_cast<double>(here.end.row) * tiles.extent_z())};
-  return part.x0 < part.x1 && part.z0 < part.z1 ? part : all;
-}
-
-TilePoint locate_here(const TileGrid& grid, const TileRange& here, WorldPoint point) {
-  constexpr double kOnTheEdge = 0.002;  // half steps
-  TilePoint at = grid.locate(point);
-  if (at.tile.column == here.end.column && at.point.x <= kOnTheEdge) {
-    at.tile.column -= 1;
-    at.point.x = 2.0 * grid.shape().cell_columns();
-  }
-  if (at.tile.row == here.end.row && at.point.z <= kOnTheEdge) {
-    at.tile.row -= 1;
-    at.point.z = grid.shape().cell_rows();
-  }
-  return at;
-}
-
-namespace {
-
-SampleGrid natural_grid_of_all(const Metadata& metadata) {
-  if (!is_warped(metadata)) return source_grid(metadata.source);
+SampleGrid natural_grid(const Metadata& metadata) {
   const WorldBounds& ground = metadata.valid;
+  if (!is_warped(metadata)) {
+    const SampleGrid all = source_grid(metadata.source);
+    return is_cut(metadata) ? part_of(all, ground).value_or(all) : all;
+  }
   SampleGrid grid;
   // One area for one of the source's, in the middle of its ground.
   grid.spacing_x = grid.spacing_z = std::sqrt(metadata.source.spacing_x * metadata.source.spacing_z);
@@ -424,29 +398,6 @@ SampleGrid natural_grid_of_all(const Metadata& metadata) {
   grid.first_x = ground.x0 + grid.spacing_x / 2.0;
   grid.first_z = ground.z0 + grid.spacing_z / 2.0;
   return grid;
-}
-
-}  // namespace
-
-SampleGrid natural_grid(const Metadata& metadata) {
-  const SampleGrid all = natural_grid_of_all(metadata);
-  if (!part_record(metadata)) return all;
-  std::optional<SampleGrid> part = part_of(all, ground_here(metadata));
-  if (!part) return all;
-  // What lies on the edge of two parts is the eastern, the southern one's: the tiles that it is looked up in are there.
-  const TileGrid& tiles = metadata.grid;
-  const TileRange here = tiles_here(metadata);
-  constexpr double kOnTheEdge = 1e-6;  // of a spacing
-  const auto drop_edge = [](std::int64_t& samples, double first, double spacing, double edge) {
-    if (samples > 1 && first + static_cast<double>(samples - 1) * spacing > edge - kOnTheEdge * spacing) --samples;
-  };
-  if (here.end.column < tiles.tile_columns()) {
-    drop_edge(part->width, part->first_x, part->spacing_x, static_cast<double>(here.end.column) * tiles.extent_x());
-  }
-  if (here.end.row < tiles.tile_rows()) {
-    drop_edge(part->height, part->first_z, part->spacing_z, static_cast<double>(here.end.row) * tiles.extent_z());
-  }
-  return *part;
 }
 
 namespace {
@@ -620,17 +571,13 @@ bool samples_are_areas(const Metadata& metadata) {
 bool may_have_nodata(const Metadata& metadata, const SampleGrid& grid) {
   if (grid.goes_by_places()) return true;
   const TileGrid& tiles = metadata.grid;
-  const TileRange here = tiles_here(metadata);
-  const auto edge = [](std::int64_t tile, double extent) { return static_cast<double>(tile) * extent; };
   const auto turn = turn_of(metadata);
-  const bool goes_round = turn && turn->ground_x1 - turn->ground_x0 >= turn->length * (1.0 - 1e-9) &&
-                          here.first.column == 0 && here.end.column == tiles.tile_columns();
+  const bool goes_round = turn && turn->ground_x1 - turn->ground_x0 >= turn->length * (1.0 - 1e-9);
   const double first_x = goes_round ? 0.0 : turn ? turn->onto_ground(grid.first_x, 0.0) : grid.first_x;
   const double last_x = goes_round ? 0.0 : first_x + static_cast<double>(grid.width - 1) * grid.spacing_x;
   const double last_z = grid.first_z + static_cast<double>(grid.height - 1) * grid.spacing_z;
-  return is_warped(metadata) || metadata.statistics.voids > 0 || metadata.outside == Outside::kVoid ||
-         first_x < edge(here.first.column, tiles.extent_x()) || grid.first_z < edge(here.first.row, tiles.extent_z()) ||
-         last_x > edge(here.end.column, tiles.extent_x()) || last_z > edge(here.end.row, tiles.extent_z());
+  return is_warped(metadata) || metadata.statistics.voids > 0 || metadata.outside == Outside::kVoid || first_x < 0.0 ||
+         grid.first_z < 0.0 || last_x > tiles.world_width() || last_z > tiles.world_height();
 }
 
 Georeference source_georeference(const SourceRecord& source) {

@@ -14,13 +14,6 @@ namespace isohf {
 /// The samples of a grid in world units that lie in a part of the world; nullopt where none does.
 [[nodiscard]] std::optional<SampleGrid> part_of(const SampleGrid& grid, const WorldBounds& ground);
 
-/// The ground that an archive has tiles of: all of it, or of a part that of its tiles.
-[[nodiscard]] WorldBounds ground_here(const Metadata& metadata);
-
-/// The tile under a point. What lies on an edge with tiles that an archive's part has not, to a thousandth of a step, is
-/// looked up in the part's own. here  as tiles_here()
-[[nodiscard]] TilePoint locate_here(const TileGrid& grid, const TileRange& here, WorldPoint point);
-
 /// Once round the body, where columns of an archive's world are longitudes.
 struct Turn {
   double length;  ///< world units

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <limits>
 
-#include "isohf/archive/metadata/part_record.h"
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/assert.h"
@@ -167,7 +166,7 @@ struct Surface::State {
       : archive(its_archive),
         job(its_job),
         sampler(archive.grid(), archive.metadata().quantisation, tiles_of(archive),
-                job.memory_bytes > 0 ? job.memory_bytes : kDefaultMemory, tiles_here(archive.metadata())),
+                job.memory_bytes > 0 ? job.memory_bytes : kDefaultMemory),
         georeference(archive.metadata()) {
     if (job.threads != 0) arena.emplace(job);
   }
@@ -267,13 +266,12 @@ struct RowReader::State {
       const int plane = method == RestoreMethod::kPlane ? plane_for(metadata, grid) : 0;
       const TileGrid tiles = metadata.plane_grid(plane);
       rows.emplace(tiles, metadata.wraps_x, metadata.quantisation, tiles_of(archive, plane), grid, method,
-                   metadata.grid, choose_memory(tiles, method, job), turn_of(metadata),
-                   plane == 0 ? std::optional(tiles_here(metadata)) : std::nullopt);
+                   metadata.grid, choose_memory(tiles, method, job), turn_of(metadata));
       return;
     }
     georeference.emplace(metadata);
     if (!georeference->has_geo()) refuse_place("degrees");
-    points.emplace(metadata.grid, metadata.quantisation, tiles_of(archive), kTileBytes, tiles_here(metadata));
+    points.emplace(metadata.grid, metadata.quantisation, tiles_of(archive), kTileBytes);
   }
 
   /// As many rows at once as there is room for.

@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "isohf/archive/metadata/cut_record.h"
 #include "isohf/error.h"
 #include "isohf/projection/reference_map.h"
 #include "isohf/restore/archive_geometry.h"
@@ -71,10 +72,11 @@ struct WorldGeoreference::State {
 
   std::optional<double> turn;  ///< of the source's coordinates once round the body, where a length of them is that
 
-  /// Of all turns of a longitude, or an easting, the one nearest to the source's middle: its own, from -180 or from 0 on.
+  double middle = 0.0;  ///< of the source, or of what was extracted, in the source's coordinates
+
+  /// Of all turns of a longitude, or an easting, the one nearest to the middle.
   [[nodiscard]] double own_turn(double longitude) const {
     if (!turn) return longitude;
-    const double middle = first_sample.easting + 0.5 * static_cast<double>(geometry.width - 1) * step_x;
     return longitude - *turn * std::nearbyint((longitude - middle) / *turn);
   }
 
@@ -100,6 +102,11 @@ WorldGeoreference::WorldGeoreference(const Metadata& metadata) {
     state->first_sample = {*source.origin_x, *source.origin_y};
     state->step_x = source.crs_spacing_x;
     state->step_y = source.crs_spacing_y;
+    const WorldBounds& ground = metadata.valid;
+    const double from_first = is_cut(metadata) && !state->geometry.warp
+                                  ? (0.5 * (ground.x0 + ground.x1) - source.first_sample_x) / source.spacing_x
+                                  : 0.5 * static_cast<double>(source.width - 1);
+    state->middle = state->first_sample.easting + from_first * state->step_x;
     state->is_lost = state->geometry.warp && state->geometry.warp->projection.kind == ProjectionKind::kSystem &&
                      !state->geometry.warp->projection.map;
     if (state->geometry.warp && !state->is_lost) state->warp.emplace(*state->geometry.warp);

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "isohf/archive/container/archive_directory.h"
+#include "isohf/archive/metadata/cut_record.h"
 #include "isohf/error.h"
 #include "isohf/projection/projected_extent.h"
 #include "isohf/projection/projection.h"
@@ -123,15 +124,20 @@ class Contradictions {
       if (!source.origin_x || !source.origin_y) return add("source.crs", "has no origin, which the projection needs");
       return check_name("source.crs", [&] { check_warped_degrees(); });
     }
-    const bool area = source.registration == Registration::kArea;
-    check_number("source.first_sample.x", area ? source.spacing_x / 2.0 : 0.0, source.spacing_x);
-    check_number("source.first_sample.z", area ? source.spacing_z / 2.0 : 0.0, source.spacing_z);
-    const auto length = [](std::int64_t samples, bool whole, double spacing, double world) {
-      return std::min(static_cast<double>(whole ? samples : samples - 1) * spacing, world);
+    const double half = source.registration == Registration::kArea ? 0.5 : 0.0;
+    if (!is_cut(metadata_)) {
+      check_number("source.first_sample.x", half * source.spacing_x, source.spacing_x);
+      check_number("source.first_sample.z", half * source.spacing_z, source.spacing_z);
+    }
+    const auto end = [](double first, std::int64_t samples, double beyond, double spacing, double world) {
+      return std::clamp(first + (static_cast<double>(samples - 1) + beyond) * spacing, 0.0, world);
     };
-    check_number("valid.x1", length(source.width, area || metadata_.wraps_x, source.spacing_x, grid.world_width()),
+    check_number("valid.x1",
+                 end(source.first_sample_x, source.width, metadata_.wraps_x ? 1.0 - half : half, source.spacing_x,
+                     grid.world_width()),
                  grid.world_width());
-    check_number("valid.z1", length(source.height, area, source.spacing_z, grid.world_height()), grid.world_height());
+    check_number("valid.z1", end(source.first_sample_z, source.height, half, source.spacing_z, grid.world_height()),
+                 grid.world_height());
     if (metadata_.projection && source.crs_unit == "degree" && source.origin_x && source.origin_y)
       check_scaled_degrees();
   }

@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "isohf/archive/container/content_hash.h"
-#include "isohf/archive/metadata/part_record.h"
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/tile_locator.h"
 #include "isohf/error.h"
@@ -33,30 +32,13 @@ PlaneCheck::PlaneCheck(const ArchiveReader& archive, const ScratchFolder& scratc
     : archive_(archive),
       builder_(
           planes_of(archive.metadata()), archive.metadata().quantisation.type, described_as_stored,
-          [this](int plane, TileIndex tile, const EncodedTile& expected) { check(plane, tile, expected); }, scratch) {
-  const auto part = part_record(archive.metadata());
-  if (part && part->shard) shard_ = part->tiles;
-}
-
-/// Whether all that a row of a plane's tiles is made of is here.
-bool PlaneCheck::is_known(int plane, std::int64_t row) const {
-  if (!shard_) return true;
-  const std::int64_t stride = archive_.metadata().planes.stride;
-  std::int64_t first = row;
-  std::int64_t end = row + 1;
-  for (; plane > 0; --plane) {
-    first = std::max<std::int64_t>(first * stride - 1, 0);
-    end = end * stride + 1;
-  }
-  return first >= shard_->first.row && std::min(end, archive_.grid().tile_rows()) <= shard_->end.row;
-}
+          [this](int plane, TileIndex tile, const EncodedTile& expected) { check(plane, tile, expected); }, scratch) {}
 
 void PlaneCheck::add(const TileCodes* codes, std::uint32_t code_min, std::uint32_t code_max) {
   builder_.add(codes == nullptr ? PlaneSample() : builder_.sample(*codes, code_min, code_max));
 }
 
 void PlaneCheck::check(int plane, TileIndex tile, const EncodedTile& expected) {
-  if (!is_known(plane, tile.row)) return;
   const std::string where = fmt::format("plane {} tile ({},{})", plane, tile.column, tile.row);
   const auto add = [&](int id, const std::string& what) { problems_.emplace_back(id, where + " " + what); };
   TileEntry entry;

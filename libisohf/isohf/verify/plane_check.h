@@ -29,11 +29,8 @@ class PlaneCheck {
 
  private:
   void check(int plane, TileIndex tile, const EncodedTile& expected);
-  [[nodiscard]] bool is_known(int plane, std::int64_t row) const;
 
   const ArchiveReader& archive_;
-  std::optional<TileRange>
-      shard_;  ///< what it holds, where it is a plan's shard: planes are made of what is beside, too
   PlaneBuilder builder_;
   std::vector<Problem> problems_;
 };

@@ -16,7 +16,6 @@
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/metadata/accuracy_info.h"
-#include "isohf/archive/metadata/part_record.h"
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/planes/plane_builder.h"
 #include "isohf/archive/tile_locator.h"
@@ -82,8 +81,7 @@ class Verification {
         shape_(grid_.shape()),
         void_heights_(static_cast<std::size_t>(shape_.stored_vertex_count()), std::numeric_limits<float>::quiet_NaN()),
         void_digest_(tile_content_digest(void_tile(shape_, archive.metadata().quantisation))),
-        counted_(archive.metadata()),
-        here_(tiles_here(archive.metadata())) {
+        counted_(archive.metadata()) {
     first_border_row_ = shape_.rows();
     for (std::size_t i = 0; i < shared_.size(); ++i) {
       shared_[i] = shared_vertices(shape_, kComparedNeighbours[i]);
@@ -231,18 +229,14 @@ class Verification {
       const std::size_t complete = tiles.size() - (is_last ? 0 : 1);
       compare_tiles({first, row}, tiles, complete, east, above);
       for (std::size_t i = 0; i < complete; ++i) {
-        if (here_.contains({first + static_cast<std::int64_t>(i), row})) ++report_.tiles_checked;
+        ++report_.tiles_checked;
         borders.push_back(finish_tile(tiles[i]));
       }
       first += static_cast<std::int64_t>(complete);
       tiles.erase(tiles.begin(), tiles.begin() + static_cast<std::ptrdiff_t>(complete));
     }
-    // Seeds follow from the whole row: where a tile of it cannot be read, that is said already. Those of a part that
-    // holds a piece of the row tell of what isn't here.
-    if (seeds_) {
-      const bool is_whole = here_.end.column - here_.first.column >= columns;
-      add_seed_problems(seeds_->end_row(row, is_whole && row_is_readable_));
-    }
+    // Seeds follow from the whole row: where a tile of it cannot be read, that is said already.
+    if (seeds_) add_seed_problems(seeds_->end_row(row, row_is_readable_));
     if (planes_) {
       for (auto& [id, text] : planes_->problems()) add(make(id, {}, std::move(text)));
     }
@@ -294,7 +288,6 @@ class Verification {
     if (tile.entry.stored) return true;
     tile.readable = true;
     tile.digest = void_digest_;
-    if (!here_.contains(index)) return false;
     for (int row = 1; row <= shape_.rows() - 2; ++row) {
       const CountedVertices::Columns columns = counted_.of_row(index, row);
       tile.statistics.vertices += std::max(0, columns.last - columns.first + 1);
@@ -431,9 +424,6 @@ class Verification {
     const TileIndex step = kComparedNeighbours[neighbour];
     const TileIndex other_index = tile_is_there ? TileIndex{index.column - step.column, index.row - step.row}
                                                 : TileIndex{index.column + step.column, index.row + step.row};
-    const std::int64_t columns = grid_.tile_columns();
-    if (!here_.contains(index) || !here_.contains({(other_index.column + columns) % columns, other_index.row}))
-      return 0;
     std::array<int, 3> found{};
     const auto report = [&](int id, int kind, GridVertex vertex, const std::string& what) {
       if (found[static_cast<std::size_t>(kind)]++ < kKeptPerTileAndKind) {
@@ -539,7 +529,6 @@ class Verification {
   std::vector<float> void_heights_;
   std::vector<std::byte> void_digest_;
   CountedVertices counted_;
-  TileRange here_;  ///< of a part: nothing is said of the other tiles
   std::array<std::vector<SharedVertex>, std::size(kComparedNeighbours)> shared_;
   std::int64_t tiles_at_once_ = 0;
   ScratchFolder scratch_;
@@ -562,9 +551,9 @@ VerifyReport verify_archive(const std::string& path, const Job& job, std::size_t
   try {
     archive = std::make_unique<ArchiveReader>(path);
     check_statistics_of(archive->metadata());
-    (void)part_record(archive->metadata());  // what cannot be understood is found before anything is counted
+    (void)counts_source_ground(archive->metadata());
   } catch (const Error& error) {
-    if (error.code() == ErrorCode::kIo) throw;
+    if (error.code() == ErrorCode::kIo || error.code() == ErrorCode::kInvalidArgument) throw;
     VerifyReport report;
     report.findings.push_back({finding::kNotReadable, Severity::kError, {}, error.what()});
     report.findings_total = 1;

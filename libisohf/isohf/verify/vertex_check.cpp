@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/metadata/part_record.h"
+#include "isohf/archive/metadata/cut_record.h"
+#include "isohf/archive/metadata/shard_record.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/memory/memory_budget.h"
 #include "isohf/error.h"
@@ -35,8 +36,7 @@ class VertexCheck {
         kernel_(Kernel::make(known(metadata_.filter, "filter"), known(metadata_.edges, "edges"))),
         prefilter_(Prefilter::make(kernel_.filter(), known(metadata_.acquisition, "acquisition"))),
         limits_(code_limits(metadata_)),
-        here_(tiles_here(metadata_)),
-        only_on_ground_(!states_job(metadata_) && !archive.find_member(kWholeName)) {
+        only_on_ground_(!states_job(metadata_)) {
     (void)check_same_source(archive, source.info());
     const Quantisation& q = metadata_.quantisation;
     const Statistics& statistics = metadata_.statistics;
@@ -48,6 +48,9 @@ class VertexCheck {
     const double largest = std::max(std::abs(range.min), std::abs(range.max));
     const double stored = q.type == CodeType::kF32 ? 0x1p-24 * largest : metadata_.rounding.value_or(0.5 * q.scale);
     report_.bound = stored + height_error(kernel_, prefilter_, range, datum_);
+    // A cut of a projected archive has its own approximation of the map, to a fraction of a sample.
+    constexpr double kPlaceError = 0x1p-11;
+    if (is_cut(metadata_) && is_warped(metadata_)) report_.bound += kPlaceError * (range.max - range.min);
     can_clamp_ = metadata_.z_range || statistics.clamped > 0;
   }
 
@@ -59,10 +62,10 @@ class VertexCheck {
                                          : SourceRows(source_, ways.step);
     BandReader reader(rows, datum_, prefilter_, archive_geometry(metadata_).wraps_x);
     std::vector<VertexReport> tiles(static_cast<std::size_t>(grid_.tile_columns()));
-    for (std::int64_t row = here_.first.row; row < here_.end.row; ++row) {
-      for (std::int64_t first = here_.first.column; first < here_.end.column; first += ways.tile_columns) {
+    for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
+      for (std::int64_t first = 0; first < grid_.tile_columns(); first += ways.tile_columns) {
         job.throw_if_cancelled();
-        const std::int64_t end = std::min(first + ways.tile_columns, here_.end.column);
+        const std::int64_t end = std::min(first + ways.tile_columns, grid_.tile_columns());
         const auto band = reader.read(cutter->rows_needed(row), columns_of(*cutter, first, end));
         oneapi::tbb::parallel_for(first, end, [&](std::int64_t column) {
           tiles[static_cast<std::size_t>(column)] = check_tile(*cutter, *band, {column, row});
@@ -185,7 +188,6 @@ class VertexCheck {
   Prefilter prefilter_;
   double datum_ = 0.0;
   const CodeLimits limits_;
-  const TileRange here_;  ///< of a part: it says nothing of the others
   /// What was cut from a coarse plane goes on level where the whole's tiles end, and nothing tells where that is.
   const bool only_on_ground_;
   bool can_clamp_ = false;

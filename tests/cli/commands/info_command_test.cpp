@@ -68,17 +68,7 @@ TEST_F(InfoCommand, SaysThatTheSourcesSamplesAreKept) {
   EXPECT_THAT(text, HasSubstr("residual/ (1 members, "));
 }
 
-TEST_F(InfoCommand, SaysThatAPartIsOneAndOfWhichGround) {
-  ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", folder / "p.isohf", "--tiles", "1:2,0:2", "-q"}).exit_code,
-            0);
-  const std::string text = run_isohf({"info", folder / "p.isohf"}).out;
-  const std::int64_t tiles = ArchiveReader(folder / "p.isohf").grid().tile_count();
-  EXPECT_THAT(text, HasSubstr("2 stored, 0 wholly void, " + std::to_string(tiles - 2) + " not in this part"));
-  EXPECT_THAT(text, HasSubstr("columns 1 to 1, rows 0 to 1 of a whole, x "));
-  EXPECT_THAT(run_isohf({"info", folder / "a.isohf"}).out, testing::Not(HasSubstr("part ")));
-}
-
-TEST_F(InfoCommand, HoldsAPartAgainstTheSamplesOnItsGround) {
+TEST_F(InfoCommand, ComparesAnExtractWithTheSamplesOnItsGround) {
   const auto bits = [&](const char* name) {
     return json::parse(run_isohf({"info", folder / name, "--json"}).out).at("bits_per_source_sample").get<double>();
   };

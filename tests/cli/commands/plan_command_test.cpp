@@ -60,9 +60,6 @@ TEST(PlanCommand, ShapeIsDescribedOrAnsweredWithTheNearestValidOne) {
   const json candidates = json::parse(run_isohf({"plan", "--shape", "212x243", "--json"}).out).at("candidates");
   ASSERT_EQ(candidates.size(), 1U);
   EXPECT_EQ(candidates[0].at("triangles"), 100080);
-  const RunResult unwritten = run_isohf({"plan", "dem.tif", "--shards", "3"});
-  EXPECT_EQ(unwritten.exit_code, 2);
-  EXPECT_EQ(unwritten.err, "isohf: plan: --shards needs --write FILE\n");
   const RunResult bad = run_isohf({"plan", "--shape", "48x55", "--levels", "3"});
   EXPECT_EQ(bad.exit_code, 2);
   EXPECT_EQ(bad.out, "");

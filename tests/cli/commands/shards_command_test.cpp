@@ -1,4 +1,4 @@
-/// `plan --write`, `convert --plan`, `merge` and `extract` as a user meets them: what is refused, and how.
+/// `convert --shard`, `merge` and `extract` as a user meets them: what is refused, and how.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "support/rasters/degree_grid.h"
 #include "support/rasters/plain_tiff.h"
@@ -30,25 +31,21 @@ class ShardsCommand : public testing::Test {
       return static_cast<std::int16_t>(200.0 +
                                        90.0 * std::sin(static_cast<double>(c) * 0.05 + static_cast<double>(r) * 0.03));
     });
-    plan("land.plan", {"--shadow-seeds"});
   }
   RunResult run(const Words& words) {
     RunOptions options;
     options.folder = folder.path();
     return run_isohf(words, options);
   }
-  void plan(const std::string& name, const Words& more = {}, const std::string& input = "land.tif") {
-    Words words = {"plan", input, "--write", name, "--shards", "3", "--shape", "28x35", "-q"};
+  Words words_of(const std::string& number, const std::string& output, const Words& more = {}) {
+    Words words = {"convert", "land.tif", "-o",        output,  "--shard",       number,
+                   "--shape", "28x35",    "--z-range", "0:500", "--shadow-seeds"};
     words.insert(words.end(), more.begin(), more.end());
-    const RunResult made = run(words);
-    ASSERT_EQ(made.exit_code, 0) << made.err;
+    return words;
   }
-  RunResult shard(const std::string& name, const std::string& number, const std::string& output) {
-    return run({"convert", "--plan", name, "--shard", number, "-o", output});
-  }
-  void make_shards(const std::string& name, const std::string& stem) {
+  void make_shards(const std::string& stem, const Words& more = {}) {
     for (const char* k : {"1", "2", "3"}) {
-      const RunResult made = shard(name, std::string(k) + "/3", stem + k + ".isohf");
+      const RunResult made = run(words_of(std::string(k) + "/3", stem + k + ".isohf", more));
       ASSERT_EQ(made.exit_code, 0) << made.err;
       EXPECT_EQ(made.err, "");
       EXPECT_THAT(made.out, HasSubstr(std::string("shard ") + k + "/3 done: " + stem + k + ".isohf, "));
@@ -69,96 +66,126 @@ class ShardsCommand : public testing::Test {
 };
 
 TEST_F(ShardsCommand, MakeTheBytesOfOneRunAndAreNotMadeTwice) {
-  make_shards("land.plan", "p-");
-  const RunResult again = shard("land.plan", "2/3", "p-2.isohf");
+  make_shards("p-");
+  const RunResult again = run(words_of("2/3", "p-2.isohf"));
   EXPECT_EQ(again.exit_code, 0);
   EXPECT_THAT(again.out, HasSubstr("shard 2/3 done already: p-2.isohf, "));
-  EXPECT_EQ(run({"merge", "land.plan", "p-1.isohf", "p-2.isohf", "p-3.isohf", "-o", "land.isohf"}).exit_code, 0);
-  EXPECT_EQ(run({"convert", "land.tif", "single.isohf", "--shadow-seeds", "--shape", "28x35"}).exit_code, 0);
+  expect_refused(words_of("1/3", "p-2.isohf"), 2, "p-2.isohf");
+  EXPECT_EQ(run({"merge", "p-1.isohf", "p-2.isohf", "p-3.isohf", "-o", "land.isohf"}).exit_code, 0);
+  EXPECT_EQ(run({"convert", "land.tif", "single.isohf", "--shadow-seeds", "--shape", "28x35", "--z-range", "0:500"})
+                .exit_code,
+            0);
   EXPECT_EQ(read_file(folder / "land.isohf"), read_file(folder / "single.isohf"));
   fs::remove(folder / "p-1.isohf");
   fs::resize_file(folder / "p-3.isohf", 5000);
-  const RunResult missing = run({"merge", "land.plan", "p-2.isohf", "p-3.isohf", "--missing"});
+  const RunResult missing = run({"merge", "p-2.isohf", "p-3.isohf", "--missing"});
   EXPECT_EQ(missing.exit_code, 0);
   EXPECT_EQ(missing.out, "1,3\n");
-  const json document = json::parse(run({"merge", "land.plan", "p-2.isohf", "p-3.isohf", "--missing", "--json"}).out);
+  const json document = json::parse(run({"merge", "p-2.isohf", "p-3.isohf", "--missing", "--json"}).out);
   EXPECT_EQ(document.at("missing"), json({1, 3}));
   EXPECT_EQ(document.at("shards"), 3);
+  expect_refused({"merge", "p-3.isohf", "--missing"}, 1, "p-3.isohf: ");
 }
 
-TEST_F(ShardsCommand, AreRefusedByNumberPlanAndSource) {
-  expect_refused({"convert", "--plan", "land.plan", "--shard", "4/3", "-o", "a.isohf"}, 2,
-                 "--shard 4/3: land.plan has shards 1/3 to 3/3");
-  expect_refused({"convert", "--plan", "land.plan", "--shard", "1/4", "-o", "a.isohf"}, 2,
-                 "--shard 1/4: land.plan has shards 1/3 to 3/3");
-  expect_refused({"convert", "--plan", "land.plan", "--shard", "0/3", "-o", "a.isohf"}, 2, "--shard");
-  expect_refused({"convert", "--plan", "land.plan", "--shard", "one", "-o", "a.isohf"}, 2, "must be K/N, as in 3/16");
-  expect_refused({"convert", "--plan", "land.plan", "-o", "a.isohf"}, 2, "which shard? Give --shard K/N");
-  expect_refused({"convert", "--plan", "land.plan", "--shard", "1/3", "-o", "a.isohf", "--level", "9"}, 2,
-                 "--level is settled by the plan; isohf plan takes it");
-  expect_refused({"convert", "--plan", "none.plan", "--shard", "1/3", "-o", "a.isohf"}, 1, "none.plan: ");
-  expect_refused({"convert", "--plan", "land.tif", "--shard", "1/3", "-o", "a.isohf"}, 1,
-                 "land.tif: is no plan of a conversion");
-  std::string text = read_file(folder / "land.plan");
-  text.replace(text.find("\"version\": 2"), 12, "\"version\": 7");
-  write_file(folder / "newer.plan", text);
-  expect_refused({"convert", "--plan", "newer.plan", "--shard", "1/3", "-o", "a.isohf"}, 1,
-                 "newer.plan: is a plan of version 7, 2 is read");
-  expect_refused({"merge", "newer.plan", "land.tif", "-o", "a.isohf"}, 1,
-                 "newer.plan: is a plan of version 7, 2 is read");
-  // A source that was changed: as many bytes, another time.
-  fs::last_write_time(folder / "land.tif", fs::last_write_time(folder / "land.tif") + std::chrono::seconds(5));
-  expect_refused({"convert", "--plan", "land.plan", "--shard", "1/3", "-o", "a.isohf"}, 2,
-                 "land.tif: source, options or program are not those that were planned");
+TEST_F(ShardsCommand, AreRefusedByNumberAndOptions) {
+  expect_refused(words_of("4/3", "a.isohf"), 2, "there is no shard 4 of 3");
+  expect_refused(words_of("1/999", "a.isohf"), 2, "999 shards are too many");
+  expect_refused(words_of("0/3", "a.isohf"), 2, "--shard");
+  expect_refused(words_of("one", "a.isohf"), 2, "must be K/N, as in 3/16");
+  expect_refused({"convert", "land.tif", "-o", "a.isohf", "--shard", "1/3"}, 2,
+                 "--shard needs --z-range MIN:MAX, or --type f32, as no shard sees all elevations; isohf info --stats "
+                 "INPUT prints their range");
+  for (const Words& more : {Words{"--dry-run"}, {"--resume"}, {"--max-error", "3"}, {"--report"}})
+    expect_refused(words_of("1/3", "a.isohf", more), 2, more.front() + " has no place with --shard");
+  const RunResult floats = run({"convert", "land.tif", "-o", "a.isohf", "--shard", "1/3", "--type", "f32"});
+  EXPECT_EQ(floats.exit_code, 0) << floats.err;
+}
+
+TEST_F(ShardsCommand, AreReadByMergeAndInfoAlone) {
+  make_shards("p-");
+  EXPECT_THAT(run({"info", "p-3.isohf"}).out, HasSubstr("3 of 3, rows "));
+  const std::string why = "p-3.isohf: is shard 3 of 3; merge the shards first: isohf merge ";
+  for (const Words& words : {Words{"verify", "p-3.isohf"},
+                             {"export", "p-3.isohf", "a.tif"},
+                             {"sample", "p-3.isohf", "--at", "1", "1"},
+                             {"shade", "p-3.isohf", "-o", "a.png"},
+                             {"diff", "p-3.isohf", "p-3.isohf"},
+                             {"extract", "p-3.isohf", "-o", "a.isohf", "--tiles", "0:1,0:1"}}) {
+    expect_refused(words, 2, why);
+  }
 }
 
 TEST_F(ShardsCommand, AreJoinedOnlyWithTheirOwnAndNothingIsLost) {
-  plan("other.plan", {"--z-range", "0,500"});
-  make_shards("land.plan", "p-");
-  make_shards("other.plan", "o-");
+  make_shards("p-");
+  make_shards("o-", {"--level", "3"});
   const std::string kept = read_file(folder / "p-1.isohf");
-  expect_refused({"merge", "land.plan", "p-1.isohf", "o-2.isohf", "p-3.isohf", "-o", "a.isohf"}, 2,
-                 "o-2.isohf: is a shard of another plan; of the plan's 3 shards these are missing: 2");
-  expect_refused({"merge", "land.plan", "p-1.isohf", "p-2.isohf", "p-3.isohf", "-o", "p-1.isohf"}, 2, "p-1.isohf: ");
-  expect_refused({"merge", "land.plan", "p-1.isohf", "p-2.isohf", "p-3.isohf", "-o", "p-1.isohf", "--overwrite"}, 2,
-                 "p-1.isohf: ");
+  expect_refused({"merge", "p-1.isohf", "o-2.isohf", "p-3.isohf", "-o", "a.isohf"}, 2,
+                 "o-2.isohf: is a shard of another conversion than p-1.isohf; of 3 shards these are missing: 2");
+  expect_refused({"merge", "p-1.isohf", "p-2.isohf", "p-3.isohf", "-o", "p-1.isohf"}, 2, "p-1.isohf: ");
+  expect_refused({"merge", "p-1.isohf", "p-2.isohf", "p-3.isohf", "-o", "p-1.isohf", "--overwrite"}, 2, "p-1.isohf: ");
   EXPECT_EQ(read_file(folder / "p-1.isohf"), kept);
-  expect_refused({"merge", "land.plan", "p-1.isohf", "p-1.isohf", "p-2.isohf", "-o", "a.isohf"}, 2,
-                 "p-1.isohf: is shard 1, as p-1.isohf is; of the plan's 3 shards these are missing: 3");
-  expect_refused({"merge", "land.plan", "p-1.isohf", "land.tif", "-o", "a.isohf"}, 1, "land.tif: ");
-  expect_refused({"merge", "p-1.isohf", "p-2.isohf", "p-3.isohf", "-o", "a.isohf"}, 2, "name its plan first");
+  expect_refused({"merge", "p-1.isohf", "p-1.isohf", "p-2.isohf", "-o", "a.isohf"}, 2,
+                 "p-1.isohf: is shard 1, as p-1.isohf is; of 3 shards these are missing: 3");
+  expect_refused({"merge", "p-1.isohf", "land.tif", "-o", "a.isohf"}, 1, "land.tif: ");
   // Bytes that were changed in two of them: both are named, and what stands under the output's name stays.
   for (const char* name : {"p-2.isohf", "p-3.isohf"}) {
     std::string bytes = read_file(folder / name);
-    bytes[bytes.size() / 3] = static_cast<char>(bytes[bytes.size() / 3] ^ 4);
+    char& code = bytes[bytes.find(".tile") + 20];
+    code = static_cast<char>(code ^ 4);
     write_file(folder / name, bytes);
   }
   write_file(folder / "a.isohf", kept);
-  const RunResult damaged =
-      run({"merge", "land.plan", "p-1.isohf", "p-2.isohf", "p-3.isohf", "-o", "a.isohf", "--overwrite"});
+  const RunResult damaged = run({"merge", "p-1.isohf", "p-2.isohf", "p-3.isohf", "-o", "a.isohf", "--overwrite"});
   EXPECT_EQ(damaged.exit_code, 1);
   EXPECT_THAT(damaged.err, AllOf(HasSubstr("p-2.isohf: "), HasSubstr("p-3.isohf: "), HasSubstr("missing: 2-3")));
   EXPECT_EQ(read_file(folder / "a.isohf"), kept);
   EXPECT_FALSE(fs::exists(folder / "a.isohf.part"));
+  // A source that was changed: as many bytes, another time.
+  fs::last_write_time(folder / "land.tif", fs::last_write_time(folder / "land.tif") + std::chrono::seconds(5));
+  EXPECT_EQ(run(words_of("3/3", "new.isohf")).exit_code, 0);
+  expect_refused({"merge", "p-1.isohf", "new.isohf", "-o", "b.isohf"}, 2,
+                 "new.isohf: is a shard of another conversion than p-1.isohf");
 }
 
-/// Four files of one degree each, of 40x40 samples.
-class ShardsOfAMosaic : public ShardsCommand {
- protected:
-  ShardsOfAMosaic() {
-    fs::create_directory(folder / "tiles");
-    for (int i = 0; i < 4; ++i) {
-      write_degrees(folder / ("tiles/t" + std::to_string(i)), 40, 40, 10.0 + i % 2, 50.0 - i / 2, 0.025,
-                    [](double longitude, double latitude) { return 100.0 * std::sin(longitude * 9.0) + latitude; });
-    }
-    plan("tiles.plan", {}, "tiles");
-  }
-};
+/// Lines of sample with elevations and normals alone.
+std::string without_tiles(const std::string& lines) {
+  return std::regex_replace(lines, std::regex(" [0-9]+ [0-9]+\n"), "\n");
+}
 
-TEST_F(ShardsOfAMosaic, AreRefusedWhereAFileThatTheyReadWasChanged) {
-  fs::last_write_time(folder / "tiles/t0.flt", fs::last_write_time(folder / "tiles/t0.flt") + std::chrono::seconds(5));
-  expect_refused({"convert", "--plan", "tiles.plan", "--shard", "1/3", "-o", "n.isohf"}, 2,
-                 "are not those that were planned");
+/// Places that are named alike have one elevation, and so has what is exported. Splines reach beyond the tiles.
+TEST_F(ShardsCommand, OfAnExtractEverythingIsWhereItWas) {
+  write_degrees(folder / "west", 240, 200, 6.0, 44.0, 0.01,
+                [](double longitude, double latitude) { return 900.0 + 400.0 * std::sin(longitude * 9.0) * latitude; });
+  for (const char* projection : {"equirectangular", "utm"}) {
+    ASSERT_EQ(run({"convert", "west.flt", "-o", "whole.isohf", "--shape", "28x35", "--projection", projection,
+                   "--overwrite", "-q"})
+                  .exit_code,
+              0);
+    const RunResult made =
+        run({"extract", "whole.isohf", "-o", "cut.isohf", "--bbox", "6.7,44.6,7.6,45.4", "--overwrite"});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    EXPECT_EQ(run({"verify", "cut.isohf"}).exit_code, 0) << run({"verify", "cut.isohf"}).out;
+    EXPECT_EQ(run({"verify", "cut.isohf", "--against", "west.flt"}).exit_code, 0);
+    std::string places;
+    for (int i = 0; i < 200; ++i)
+      places += std::to_string(6.71 + 0.00437 * i) + " " + std::to_string(44.61 + 0.0391 * (i % 20)) + "\n";
+    const auto sampled = [&](const char* archive) {
+      RunOptions options;
+      options.folder = folder.path();
+      options.input = places;
+      return run_isohf({"sample", archive, "--crs"}, options);
+    };
+    const RunResult before = sampled("whole.isohf");
+    ASSERT_EQ(before.exit_code, 0) << before.err;
+    EXPECT_EQ(without_tiles(sampled("cut.isohf").out), without_tiles(before.out));
+    const auto exported = [&](const std::string& archive) {
+      const RunResult result = run({"export", archive + ".isohf", archive + ".npy", "--bbox", "6.75,44.65,7.55,45.35",
+                                    "--spacing", "500", "--method", "barycentric", "--overwrite", "-q"});
+      EXPECT_EQ(result.exit_code, 0) << result.err;
+      return read_file(folder / (archive + ".npy"));
+    };
+    EXPECT_EQ(exported("cut"), exported("whole"));
+  }
 }
 
 TEST_F(ShardsCommand, OfAnArchiveACoarsePlaneIsAnArchiveOfItsOwn) {

@@ -199,7 +199,7 @@ TEST_F(VerifyAgainst, WarnsOfARasterWithoutAPlace) {
   EXPECT_EQ(verify("plain.bin").err, "");
 }
 
-TEST_F(VerifyAgainst, OfAPartOnlyItsOwnGroundIsCompared) {
+TEST_F(VerifyAgainst, OfAnExtractOnlyItsOwnGroundIsCompared) {
   const std::string part = folder / "part.isohf";
   for (const Words& with : std::vector<Words>{{}, {"--projection", "utm"}}) {
     Words options = {"--shape", "12x19", "--outside", "void"};
@@ -212,7 +212,7 @@ TEST_F(VerifyAgainst, OfAPartOnlyItsOwnGroundIsCompared) {
     const auto compared = nlohmann::json::parse(sound.out)["against"]["samples_compared"].get<std::int64_t>();
     EXPECT_GT(compared, 50);
     EXPECT_LT(compared, kColumns * kRows / 2);
-    // Ground of the part that is another is found all the same.
+    // Other ground is found all the same.
     write_degrees(folder / "other", kColumns, kRows, 5.0, 44.0, 0.01, [](double, double) { return 400.0; });
     EXPECT_EQ(run_isohf({"verify", part, "--against", folder / "other.flt"}).exit_code, 3);
   }

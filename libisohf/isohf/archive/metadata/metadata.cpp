@@ -348,8 +348,10 @@ void check_axis(const std::string& axis, double spacing, double first, std::int6
   require(spacing >= 1e-9 * step && spacing <= 1e12 * step, "source.spacing." + axis, spacing,
           fmt::format("lie within 1e-9 and 1e12 lattice steps of {}", step));
   const double last = first + spacing * static_cast<double>(std::max<std::int64_t>(samples - 1, 0));
-  require(std::abs(first) <= 1000.0 * world && std::abs(last) <= 1000.0 * world, "source.first_sample." + axis, first,
-          fmt::format("leave all samples near the world of {}", world));
+  // An archive of one tile may be extracted from one of 2^24.
+  constexpr double kMostWorlds = 0x1p25;
+  require(std::abs(first) <= kMostWorlds * world && std::abs(last) <= kMostWorlds * world,
+          "source.first_sample." + axis, first, fmt::format("leave all samples near the world of {}", world));
   const double slack = 1e-6 * world;
   require(valid_begin >= -slack && valid_begin <= valid_end, "valid." + axis + "0", valid_begin,
           "lie in the world, West and North first");

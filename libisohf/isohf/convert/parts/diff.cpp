@@ -10,7 +10,6 @@
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/content_hash.h"
-#include "isohf/archive/metadata/part_record.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/handed_in.h"
 #include "isohf/convert/parts/parts.h"
@@ -81,26 +80,17 @@ ArchiveDifference diff_archives(const std::string& first, const std::string& sec
   ArchiveDifference found;
   found.metadata = differing_members(a, b);
   found.why_other_lattice = why_other_vertices(a.metadata(), b.metadata());
-  TileRange& tiles = found.compared;
-  tiles = intersection(tiles_here(a), tiles_here(b));
-  if (found.why_other_lattice.empty() && tiles.is_empty()) found.why_other_lattice = "holds other tiles of the lattice";
-  if (!found.why_other_lattice.empty()) {
-    tiles = {};
-    return found;
-  }
+  if (!found.why_other_lattice.empty()) return found;
   Sums all;
   TileIndex worst{};
-  const std::int64_t columns = tiles.end.column - tiles.first.column;
+  const std::int64_t tiles = a.grid().tile_count();
   Arena(job).execute([&] {
-    for (std::int64_t at = 0; at < tiles.count(); at += kBatch) {
+    for (std::int64_t at = 0; at < tiles; at += kBatch) {
       job.throw_if_cancelled();
       enum class State { kSame, kDiffers, kOnlyFirst, kOnlySecond };
-      std::vector<State> states(static_cast<std::size_t>(std::min(kBatch, tiles.count() - at)));
+      std::vector<State> states(static_cast<std::size_t>(std::min(kBatch, tiles - at)));
       std::vector<Sums> sums(states.size());
-      const auto tile_at = [&](std::size_t i) {
-        const std::int64_t flat = at + static_cast<std::int64_t>(i);
-        return TileIndex{tiles.first.column + flat % columns, tiles.first.row + flat / columns};
-      };
+      const auto tile_at = [&](std::size_t i) { return a.grid().tile_at(at + static_cast<std::int64_t>(i)); };
       oneapi::tbb::parallel_for(std::size_t{0}, states.size(), [&](std::size_t i) {
         const TileIndex tile = tile_at(i);
         const bool in_a = a.tile_entry(tile).stored;
@@ -128,7 +118,7 @@ ArchiveDifference diff_archives(const std::string& first, const std::string& sec
         all.squares += sums[i].squares;
         all.max = std::max(all.max, sums[i].max);
       }
-      job.report({"compare", "tiles", std::min(at + kBatch, tiles.count()), tiles.count()});
+      job.report({"compare", "tiles", std::min(at + kBatch, tiles), tiles});
     }
   });
   if (surface) {

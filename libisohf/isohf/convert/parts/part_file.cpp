@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "isohf/archive/codec/tile_decoder.h"
 #include "isohf/archive/codec/tile_payload.h"
 #include "isohf/archive/container/archive_directory.h"
@@ -12,6 +10,11 @@
 #include "isohf/error.h"
 
 namespace isohf {
+
+const ArchiveReader& PartFile::archive() {
+  if (!open_) open_ = std::make_unique<const ArchiveReader>(source().bytes, path_, ArchiveReader::Shards::kRead);
+  return *open_;
+}
 
 const CopySource& PartFile::source() {
   if (!source_.bytes) source_ = {open_file_source(path_), path_};
@@ -30,15 +33,10 @@ const PagedIndex& PartFile::index() {
 
 const std::vector<std::string>& PartFile::tile_tables() {
   if (knows_tables_) return tables_;
-  const auto take = [&](const MemberTable& table) {
-    const bool is_by_tile = table.name.find("{column}") != std::string::npos;
-    if (is_by_tile && !table.name.starts_with("seeds/") && !is_in_tile_folder(table.name))
-      tables_.push_back(table.name);
-  };
-  if (path_.empty()) {
-    for (const MemberTable& table : archive().tables()) take(table);
-  } else {
-    for (const TableDescription& table : index().tables()) take(table.members);
+  for (const TableDescription& table : index().tables()) {
+    const std::string& name = table.members.name;
+    const bool is_by_tile = name.find("{column}") != std::string::npos;
+    if (is_by_tile && !name.starts_with("seeds/") && !is_in_tile_folder(name)) tables_.push_back(name);
   }
   knows_tables_ = true;
   return tables_;
@@ -64,28 +62,18 @@ std::vector<PartFile::Stored> PartFile::stored(const std::string& table, std::in
   throw error.within(source_.name);
 }
 
-std::vector<TileCodes> PartFile::decode(const TileShape& shape, CodeType type, std::span<const Stored> tiles) const {
-  const auto payload_of = [&](const TileEntry& entry) {
+TileCodes PartFile::decode(const TileShape& shape, CodeType type, const Stored& tile) const {
+  const TileEntry& entry = tile.record.entry;
+  try {
     if (entry.payload_bytes > max_payload_bytes(shape, type))
       throw Error(ErrorCode::kCorrupt, fmt::format("states a payload of {} bytes", entry.payload_bytes));
     std::vector<std::byte> payload(entry.payload_bytes);
     inflate_exactly(SourceBytes(*source_.bytes, entry.offset_bytes, entry.compressed_bytes).bytes(), payload);
     if (crc32(payload) != entry.payload_crc32) throw Error(ErrorCode::kCorrupt, "has another CRC-32 than is stated");
-    return payload;
-  };
-  std::vector<TileCodes> codes;
-  for (const Stored& tile : tiles) {
-    try {
-      codes.push_back(decode_tile(shape, type, payload_of(tile.record.entry)));
-    } catch (const Error& error) {
-      throw error.within(fmt::format("{}: tile at byte {}", source_.name, tile.record.entry.offset_bytes));
-    }
+    return decode_tile(shape, type, payload);
+  } catch (const Error& error) {
+    throw error.within(fmt::format("{}: tile at byte {}", source_.name, entry.offset_bytes));
   }
-  return codes;
-}
-
-bool is_own_member(const std::string& name) {
-  return name == kMediaTypeName || name == kMetadataName || name == kIndexName;
 }
 
 }  // namespace isohf

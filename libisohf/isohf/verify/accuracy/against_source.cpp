@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "isohf/archive/metadata/accuracy_info.h"
-#include "isohf/archive/metadata/part_record.h"
+#include "isohf/archive/metadata/cut_record.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/memory/memory_budget.h"
@@ -75,7 +75,7 @@ class Comparison {
         record_(archive.metadata().source),
         source_(source),
         info_(source.info()),
-        here_(tiles_here(archive.metadata())) {
+        is_cut_(is_cut(archive.metadata())) {
     (void)check_same_source(archive, info_);
     const Statistics& statistics = archive.metadata().statistics;
     const ElevationRange range{statistics.min.value_or(0.0), statistics.max.value_or(0.0)};
@@ -99,7 +99,6 @@ class Comparison {
     VertexRows tiles(grid_, archive_.metadata().quantisation, tiles_of(archive_), 0, grid_.tile_columns() - 1, scratch);
     for (std::int64_t tile_row = 0; !warp_ && tile_row < grid_.tile_rows() && first_row < info_.height; ++tile_row) {
       const std::int64_t end_row = rows_until(tile_row);
-      if (tile_row < here_.first.row || tile_row >= here_.end.row) first_row = end_row;
       if (end_row > first_row) {
         tiles.drop_before(tile_row);
         tiles.have(tile_row);
@@ -159,6 +158,12 @@ class Comparison {
     return scratch_for(job, bytes + tiles, bytes, "comparing");
   }
 
+  /// Whether a place is on tiles that were not extracted.
+  [[nodiscard]] bool is_elsewhere(WorldPoint world) const {
+    return is_cut_ &&
+           !(world.x >= 0.0 && world.x <= grid_.world_width() && world.z >= 0.0 && world.z <= grid_.world_height());
+  }
+
   /// The tile row under a world place; the nearest one for places beside the tiles.
   [[nodiscard]] std::int64_t tile_row_at(WorldPoint world) const {
     const double row = std::floor(world.z / grid_.extent_z());
@@ -183,7 +188,7 @@ class Comparison {
       job.report({"compare", "rows", tile_row + 1, grid_.tile_rows()});
     }
     // Every sample lies on one tile row.
-    ISOHF_ASSERT(visited_ == info_.width * info_.height);
+    ISOHF_ASSERT(is_cut_ || visited_ == info_.width * info_.height);
   }
 
   /// One past the last source row that lies North of the tile row's South edge; all that are left, for the last row.
@@ -273,8 +278,8 @@ class Comparison {
                                 locate(surface.tile_row, {0.0, z}).point.z, 0, grid_.tile_columns());
     for (std::int64_t column = 0; column < info_.width; ++column) {
       const WorldPoint world{world_x(static_cast<double>(column)), z};
+      if (is_elsewhere(world)) continue;
       const TilePoint at = locate(surface.tile_row, world);
-      if (!here_.contains({at.tile.column, surface.tile_row})) continue;
       const double stored = vertices.elevation(archive_.metadata().quantisation, at.tile.column,
                                                snapped(barycentric(grid_.shape(), at.point)));
       compare_sample(stored, band, column, row, world, sums, histogram);
@@ -309,7 +314,7 @@ class Comparison {
           const WorldPoint world = warp_->world_from_source({static_cast<double>(c), static_cast<double>(row)});
           if (tile_row_at(world) != surface.tile_row) continue;
           ++of_row.visited;
-          if (!here_.contains({grid_.locate(world).tile.column, surface.tile_row})) continue;
+          if (is_elsewhere(world)) continue;
           compare_sample(elevation_at(surface, world), band, c, row, world, of_row, histogram);
         }
       }
@@ -388,7 +393,7 @@ class Comparison {
   const SourceRecord& record_;
   HeightSource& source_;
   const SourceInfo& info_;
-  const TileRange here_;  ///< of a part: samples on other tiles are not compared
+  const bool is_cut_;
   double datum_ = 0.0;
   double span_ = 0.0;
   std::int64_t reach_ = 2;
