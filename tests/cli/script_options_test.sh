@@ -22,8 +22,6 @@ expect 0 scripts/slurm/submit --help
 expect 2 scripts/slurm/submit a.plan
 expect 0 scripts/slurm/try --help
 expect 2 scripts/slurm/try --nonsense
-expect 0 scripts/slurm/kills --help
-expect 2 scripts/slurm/kills many
 expect 2 scripts/quickstart --packages --nonsense
 expect 2 scripts/test --golden nonsense
 exit $failed
