@@ -27,8 +27,7 @@ constexpr Command kCommands[] = {
     {"convert", "Turn a raster of elevations into an archive", command_convert},
     {"info", "Describe archives and rasters", command_info},
     {"verify", "Check archives, and compare one with its source", command_verify},
-    {"restore", "Turn an archive back into a raster", command_restore},
-    {"export", "Write the surface as a raster of any grid, whole or cut into tiles", command_export},
+    {"export", "Write a raster, on the source's grid or any other, whole or cut into tiles", command_export},
     {"sample", "Print elevation and normal at places", command_sample},
     {"shade", "Draw a picture of the surface with its shadows", command_shade},
     {"extract", "Cut some tiles of an archive into one of their own", command_extract},
@@ -44,7 +43,7 @@ constexpr const char* kSummary =
 
 constexpr const char* kNotes = R"(Results go to standard output, everything else to standard error.
 
-Exit codes: 0 done, 1 failed, 2 wrong usage, 3 differences (verify, diff, restore), 130 interrupted.
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 differences (verify, diff), 130 interrupted.
 
 ISOHF_MODULE_PATH names the folder of the OpenImageIO, PROJ and netCDF modules (default: beside the program, then ../lib/isohf).
 ISOHF_SIMD=off runs the plain twins of vectorised code: slower, and the same bytes.
@@ -55,7 +54,7 @@ Examples:
   isohf plan dem.tif                      preview what convert would do
   isohf convert dem.tif dem.isohf
   isohf verify dem.isohf --against dem.tif
-  isohf restore dem.isohf back.tif
+  isohf export dem.isohf back.tif
   echo "1200.5 340" | isohf sample dem.isohf
   isohf help convert)";
 

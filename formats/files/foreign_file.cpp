@@ -19,7 +19,7 @@ namespace {
 using namespace std::string_view_literals;
 
 constexpr const char* kGdal = "gdal_translate {} OUT.tif makes a GeoTIFF of it";
-constexpr const char* kRestore = "isohf restore {} OUT.tif makes a raster of it";
+constexpr const char* kExport = "isohf export {} OUT.tif makes a raster of it";
 constexpr const char* kUnpack = "unpack it first";
 
 bool has_extension(const std::string& path, std::string_view extension) {
@@ -129,8 +129,8 @@ struct Signature {
 };
 
 constexpr Signature kSignatures[] = {
-    {"isohf.json"sv, "an isohf archive", kRestore, 30},
-    {"mimetypeapplication/vnd.isohf"sv, "an isohf archive", kRestore, 30},
+    {"isohf.json"sv, "an isohf archive", kExport, 30},
+    {"mimetypeapplication/vnd.isohf"sv, "an isohf archive", kExport, 30},
     {"PK\x03\x04"sv, "a ZIP file", "it is damaged or cut off"},
     {"\x1f\x8b"sv, "a gzip file", "gunzip it first"},
     {"BZh"sv, "a bzip2 file", kUnpack},

@@ -47,12 +47,16 @@ const std::vector<Job>& jobs() {
       {"convert_over", {"convert", "in.tif", "out.isohf", "--overwrite"}, {"out.isohf"}, true, true},
       {"convert_asc", {"convert", "in.asc", "out.isohf"}, {"out.isohf"}, true},
       {"convert_npy", {"convert", "in.npy", "out.isohf"}, {"out.isohf"}, true},
-      {"restore", {"restore", "in.isohf", "out.tif"}, {"out.tif"}},
-      {"restore_over", {"restore", "in.isohf", "out.asc", "--overwrite"}, {"out.asc", "out.prj"}, false, true},
-      {"export", {"export", "in.isohf", "out.r16"}, {"out.r16", "out.r16.json"}},
-      {"export_over", {"export", "in.isohf", "out.r16", "--overwrite"}, {"out.r16", "out.r16.json"}, false, true},
+      {"export_source", {"export", "in.isohf", "out.tif"}, {"out.tif"}},
+      {"export_source_over", {"export", "in.isohf", "out.asc", "--overwrite"}, {"out.asc", "out.prj"}, false, true},
+      {"export", {"export", "in.isohf", "out.r16", "--method", "hex"}, {"out.r16", "out.r16.json"}},
+      {"export_over",
+       {"export", "in.isohf", "out.r16", "--method", "hex", "--overwrite"},
+       {"out.r16", "out.r16.json"},
+       false,
+       true},
       {"export_tiles",
-       {"export", "in.isohf", "out.png", "--tiles", "2x1"},
+       {"export", "in.isohf", "out.png", "--tile-size", "100x150"},
        {"out_x0_y0.png", "out_x0_y0.png.json", "out_x0_y0.pgw", "out_x0_y0.png.aux.xml", "out_x1_y0.png",
         "out_x1_y0.png.json", "out_x1_y0.pgw", "out_x1_y0.png.aux.xml"}},
       {"shade", {"shade", "in.isohf", "out.png"}, {"out.png", "out.pgw", "out.png.aux.xml"}},
@@ -69,8 +73,8 @@ class Faults : public testing::TestWithParam<Job> {
   Faults() {
     fs::copy_file(ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif", folder / "in.tif");
     run_plainly({"convert", "in.tif", "in.isohf", "--lossless", "-q"});
-    run_plainly({"restore", "in.isohf", "in.npy", "-q"});
-    run_plainly({"restore", "in.isohf", "in.asc", "-q"});
+    run_plainly({"export", "in.isohf", "in.npy", "-q"});
+    run_plainly({"export", "in.isohf", "in.asc", "-q"});
     if (!job().replaces) return;
     std::vector<std::string> arguments = job().arguments;
     arguments.insert(arguments.end(), {"-q"});

@@ -142,7 +142,7 @@ TEST(OpenSource, NamesForeignFilesAndTheCommandThatHelps) {
   const std::pair<std::string, std::string> cases[] = {
       {"%PDF-1.4\n", "this is a PDF document; isohf formats lists what is read"},
       {"LASF\x01\x02", "this is a LAS point cloud; PDAL grids it: pdal translate " + path},
-      {std::string("PK\x03\x04") + std::string(26, '\0') + "isohf.json", "an isohf archive; isohf restore " + path},
+      {std::string("PK\x03\x04") + std::string(26, '\0') + "isohf.json", "an isohf archive; isohf export " + path},
       {std::string("PK\x03\x04") + std::string(40, '\0'), "this is a ZIP file; it is damaged or cut off"},
       {"GRIB\x01\x02", "this is a GRIB file; gdal_translate " + path + " OUT.tif makes a GeoTIFF of it"},
       {std::string("\x01\x02\x03", 3), "unknown format; isohf formats lists what is read"}};

@@ -426,6 +426,11 @@ void CommandLine::group(const std::string& title) {
   state_->group = title;
 }
 
+void CommandLine::positional(const std::string& name, const std::string& description, std::string& value) {
+  option(name, name, description, value);
+  state_->usage_positionals += " " + name;
+}
+
 void CommandLine::positional(const std::string& name, const std::string& flags, const std::string& description,
                              std::string& value) {
   option(flags + "," + name, name, description, value);

@@ -37,7 +37,8 @@ class CommandLine {
   CommandLine& operator=(const CommandLine&) = delete;
 
   void group(const std::string& title);
-  /// A value without a name; `flags` ("-i,--input") name it as well.
+  /// A value without a name; `flags` ("-o,--output") name it as well.
+  void positional(const std::string& name, const std::string& description, std::string& value);
   void positional(const std::string& name, const std::string& flags, const std::string& description,
                   std::string& value);
   /// All values without a name that no other positional takes; `usage` is how they are shown: "INPUT... OUTPUT",

@@ -14,7 +14,7 @@ enum ExitCode : int {
   kExitDone = 0,
   kExitFailed = 1,
   kExitUsage = 2,
-  kExitDifferences = 3,  ///< verify or diff found some, restore not what --lossless kept
+  kExitDifferences = 3,  ///< verify or diff found some
   kExitInterrupted = 130,
 };
 

@@ -14,7 +14,6 @@ int command_formats(const Arguments& arguments);
 int command_info(const Arguments& arguments);
 int command_merge(const Arguments& arguments);
 int command_plan(const Arguments& arguments);
-int command_restore(const Arguments& arguments);
 int command_sample(const Arguments& arguments);
 int command_shade(const Arguments& arguments);
 int command_verify(const Arguments& arguments);

@@ -1,10 +1,9 @@
-/// isohf export: the surface of an archive as an ortho raster of any grid, whole or cut into tiles.
+/// isohf export: an archive as a raster of elevations, on its source's grid or any other, whole or cut into tiles.
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -12,20 +11,28 @@
 #include "commands/command.h"
 #include "commands/export_tiles.h"
 #include "formats/decorate/cropped_source.h"
+#include "formats/files/text.h"
+#include "formats/georeference/reference_system.h"
 #include "isohf/base/file.h"
+#include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
+#include "isohf/projection/projection_wkt.h"
 #include "isohf/restore/sample_grids.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
 #include "options/box_ground.h"
 #include "options/describe.h"
+#include "options/input_files.h"
 #include "options/option_values.h"
 #include "options/options_common.h"
-#include "options/options_raster.h"
+#include "options/options_source.h"
+#include "options/quantities.h"
+#include "options/source_inputs.h"
 #include "output/json_output.h"
 #include "output/output_kinds.h"
 #include "output/standard_output.h"
 #include "raster/restored_raster.h"
+#include "raster/source_samples.h"
 #include "work_arena.h"
 
 namespace isohf::cli {
@@ -34,33 +41,58 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kExportFooter =
-    R"(Without options the samples lie where the source's lay. The format follows from OUTPUT's extension; .tif,
-.exr, .flt, .asc, .r32 and .npy take elevations as float32, .hgt as int16, .png, .r16 and .raw as uint16
-over the range of elevations that there is, with scale and offset in OUTPUT.json. Many tiles share one scale.
-With --tile-size or --tiles OUTPUT is cut: NAME_x0_y0.r16 is the North-West tile, x counts East, y South.
-Where the size is left open it becomes the nearest one that makes whole tiles.
+    R"(Without options, or with --like, OUTPUT has the source's sample type and scale, as far as its format holds them.
+An archive made with --lossless gives the source's samples bit for bit, and their SHA-256 is checked.
+With any other grid, --method, --z-scale or --z-offset the samples are elevations of the surface: float32 in .tif, .exr,
+.flt, .asc, .r32 and .npy, int16 in .hgt, and in .png, .r16 and .raw uint16 over the range of elevations, with scale and
+offset in OUTPUT.json. All tiles share one scale.
+With --tile-size OUTPUT is cut: NAME_x0_y0.r16 is the North-West tile, x counts East, y South. Without --size the
+size becomes the nearest one that makes whole tiles.
+Methods: hex, quintic B-splines along the lattice rows and then down the columns, is nearest to the source;
+barycentric is what a renderer shows; average is the mean over the area of each sample. Samples far apart
+are points on a coarse plane, unless a method is asked for.
 
 Examples:
+  isohf export dem.isohf back.tif
+  isohf export dem.isohf beside.tif --like other.tif
   isohf export dem.isohf dem.tif --spacing 30
   isohf export dem.isohf alps.png --size 4097x4097
   isohf export dem.isohf part.tif --bbox 6.5,45,7,45.5
-  isohf export dem.isohf unreal.r16 --tile-size 1009 --overlap 1
-  isohf export dem.isohf unity.raw --tiles 4x4 --tile-size 513 --overlap 1)";
+  isohf export dem.isohf unreal.r16 --tile-size 1009 --overlap 1)";
+
+/// Samples on a side, at most.
+constexpr std::int64_t kMostSide = std::int64_t{1} << 31U;
 
 struct ExportOptions {
   CommonOptions common;
   WorkOptions work;
-  RasterOptions raster;
+  std::string archive;
+  std::string output;
+  bool overwrite = false;
+  std::string like;
+  std::optional<GridSize> size;
+  std::optional<LengthValue> spacing;
+  std::string system;  ///< a reference system; empty: the archive's own
   std::optional<BoundingBox> bbox;
-  std::optional<std::pair<double, double>> z_range;
-  std::optional<double> z_scale;
-  std::optional<double> z_offset;
-  std::optional<GridSize> tiles;
+  std::optional<RestoreMethod> given_method;
   std::optional<GridSize> tile_size;
   std::int64_t overlap = 0;
+  std::optional<SampleType> type;
+  std::optional<double> z_scale;
+  std::optional<double> z_offset;
+  bool clamp_range = false;
 
   [[nodiscard]] RestoreMethod method(const Metadata& metadata, const SampleGrid& grid) const {
-    return raster.method.value_or(usual_method(metadata, grid));
+    return given_method.value_or(usual_method(metadata, grid));
+  }
+  /// Whether the samples have the source's type and scale.
+  [[nodiscard]] bool as_source() const { return !z_scale && !z_offset && (!like.empty() || is_on_sources_grid()); }
+  [[nodiscard]] bool is_on_sources_grid() const {
+    return like.empty() && !size && !spacing && system.empty() && !bbox && !given_method && !tile_size;
+  }
+  [[nodiscard]] SampleType written_type(const Metadata& metadata) const {
+    return type.value_or(restored_type(
+        output, as_source() ? sample_type_from_string(metadata.source.sample_type) : SampleType::kFloat32));
   }
 };
 
@@ -71,47 +103,178 @@ GridSize parse_side_or_size(const std::string& text) {
   return {side, side};
 }
 
+SampleType parse_type(const std::string& text) {
+  constexpr std::array<SampleType, 8> kTypes = {SampleType::kUint8,   SampleType::kUint16, SampleType::kInt16,
+                                                SampleType::kUint32,  SampleType::kInt32,  SampleType::kFloat16,
+                                                SampleType::kFloat32, SampleType::kFloat64};
+  return kTypes[parse_word(text, {"u8", "u16", "i16", "u32", "i32", "f16", "f32", "f64"})];
+}
+
 std::optional<ExportOptions> parse_export(const Arguments& arguments) {
   ExportOptions options;
-  CommandLine line("export", "Writes the surface of an archive as a raster of elevations.");
-  add_raster_arguments(line, "OUTPUT", options.raster);
+  CommandLine line("export", "Writes an archive as a raster of elevations.");
+  line.group("Arguments");
+  line.positional("ARCHIVE", "Archive to read", options.archive);
+  line.positional("OUTPUT", "-o,--output",
+                  "Raster to write: NAME.tif, .exr, .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy", options.output);
+  line.flag("--overwrite", "Replace OUTPUT where it exists", options.overwrite);
   line.group("Grid");
-  add_size_options(line, "Write so many samples over the ground (default: the source's samples)", options.raster);
+  line.option("--like", "INPUT", "The grid of this raster, or of a folder, \"pattern*\" or @list of them",
+              options.like);
+  line.option("--size", "WxH", "Write so many samples over the ground (default: the source's samples)",
+              [&](const std::string& text) { options.size = parse_size(text, 1, kMostSide); });
+  line.option("--spacing", "LENGTH", "Write samples so far apart: world units, or with a unit as in 30m, 0.5km, 100ft",
+              [&](const std::string& text) { options.spacing = parse_length(text); });
+  line.option("--crs", "SYSTEM",
+              "Write the raster in this reference system, each sample by its place: EPSG:2154, WKT, a PROJ string, or "
+              "a file with one of them (default: the archive's)",
+              [&](const std::string& text) { options.system = system_from(text); });
   line.option("--bbox", "W,S,E,N",
               "Only this part of the ground, in the source's coordinates; across the 180th meridian W is above E",
               [&](const std::string& text) { options.bbox = bounding_box_from_string(text); });
-  add_method_option(line, "hex", options.raster);
+  line.option("--method", "NAME",
+              "hex, barycentric or average (default hex; the source's own samples where they are kept)",
+              [&](const std::string& text) { options.given_method = restore_method_from_string(text); });
+  line.words({"hex", "barycentric", "average"});
   line.group("Tiles");
   line.option("--tile-size", "N|WxH", "Cut into tiles of so many samples, each into a file of its own",
               [&](const std::string& text) { options.tile_size = parse_side_or_size(text); });
-  line.option("--tiles", "NxM", "Cut into so many tiles across and down",
-              [&](const std::string& text) { options.tiles = parse_size(text, 1, 65536); });
   line.option("--overlap", "K", "Samples that neighbouring tiles share (default 0; 1 for shared edges)",
               [&](const std::string& text) { options.overlap = parse_whole_number(text, 0, 65536); });
   line.group("Samples");
-  add_type_option(line, "by the format", options.raster);
-  line.option("--z-range", "MIN:MAX",
-              "Elevations of the lowest and highest sample of an integer type (default of u8 and "
-              "u16: those that there are, which takes another pass)",
-              [&](const std::string& text) { options.z_range = parse_range(text); });
+  line.option(
+      "--type", "TYPE",
+      "u8, u16, i16, u32, i32, f16, f32 or f64 (default: the source's, or float32, as far as the format holds it)",
+      [&](const std::string& text) { options.type = parse_type(text); });
   line.option("--z-scale", "FACTOR", "elevation = sample * FACTOR + z-offset (default 1)",
               [&](const std::string& text) { options.z_scale = parse_positive_number(text); });
   line.option("--z-offset", "NUMBER", "See --z-scale (default 0)",
               [&](const std::string& text) { options.z_offset = parse_number(text); });
-  add_clamp_option(line, "the type", options.raster);
+  line.flag("--clamp-range", "Move samples that the type does not hold to its ends, instead of refusing",
+            options.clamp_range);
   add_work_options(line, options.work);
   add_memory_options(line, "OUTPUT's folder", options.work);
   add_common_options(line, options.common);
   line.footer(kExportFooter);
-  line.exclusive({"--z-range", "--z-scale"});
-  line.exclusive({"--z-range", "--z-offset"});
+  for (const char* option : {"--size", "--spacing", "--crs", "--bbox", "--tile-size"}) {
+    line.exclusive({"--like", option});
+  }
   if (!line.parse(arguments)) return std::nullopt;
-  require_raster_arguments(line, "OUTPUT", options.raster);
-  if (options.work.scratch_folder.empty()) options.work.scratch_folder = folder_of(options.raster.output);
-  if (options.overlap > 0 && !options.tiles && !options.tile_size) {
-    throw Error(ErrorCode::kInvalidArgument, "export: --overlap needs --tiles or --tile-size");
+  line.require("ARCHIVE", options.archive);
+  line.require("OUTPUT", options.output);
+  const bool is_archive_name = lower_case(std::filesystem::path(options.output).extension().string()) == ".isohf";
+  if (is_archive_name && options.archive != options.output) {
+    throw Error(ErrorCode::kInvalidArgument,
+                options.output + ": OUTPUT has an archive's name; ARCHIVE comes first, OUTPUT last");
+  }
+  if (options.work.scratch_folder.empty()) options.work.scratch_folder = folder_of(options.output);
+  if (options.overlap > 0 && !options.tile_size) {
+    throw Error(ErrorCode::kInvalidArgument, "export: --overlap needs --tile-size");
   }
   return options;
+}
+
+/// A system is named and spelled in many ways: the archive's, where the raster's is that.
+SourceInfo in_words_of(const Metadata& metadata, SourceInfo other) {
+  const auto own = grid_georeference(metadata, natural_grid(metadata));
+  const Georeference source = source_georeference(metadata.source);
+  ReferenceSystem& theirs = other.georeference.system;
+  for (const Georeference& known : {own.value_or(source), source}) {
+    if (are_same(known.system, theirs) == true) {
+      theirs = known.system;
+      return other;
+    }
+  }
+  const bool on_maps = source.unit == HorizontalUnit::kMetre && other.georeference.unit == HorizontalUnit::kMetre;
+  if (on_maps && !is_warped(metadata) && are_same(source.system, theirs) == false) {
+    refuse_system(other, source.system);
+  }
+  return other;
+}
+
+/// Of the raster in --like.
+SampleGrid grid_of_other(const ExportOptions& options, const Metadata& metadata) {
+  const OpenedInputs like = open_inputs(expand_inputs({options.like}, false), {}, {}, options.work);
+  const SourceInfo other = in_words_of(metadata, like.source->info());
+  std::vector<std::string> warnings;
+  std::optional<SampleGrid> grid = grid_like(metadata, other, warnings);
+  for (const std::string& warning : warnings) print_warning(warning);
+  if (!grid) {
+    const SourceFrame frame = make_source_frame(other);
+    grid = {frame.width,
+            frame.height,
+            metadata.valid.x0 + frame.first_sample_x,
+            metadata.valid.z0 + frame.first_sample_z,
+            frame.spacing_x,
+            frame.spacing_z};
+  }
+  if (grid->in_degrees && options.given_method == RestoreMethod::kHex) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: its rows are no rows of the archive, whose input was projected ({}), and --method hex "
+                            "goes along rows; leave it out, or give --method barycentric",
+                            options.like, describe_projection(metadata.projection->spec)));
+  }
+  return *grid;
+}
+
+/// The grid in --crs over a part of the world, which --bbox gives if it is there; warnings are printed.
+/// Throws Error{kInvalidArgument} for a system that is not understood, --method hex, and a spacing in metres where coordinates are degrees.
+SampleGrid asked_grid_in_system(const ExportOptions& options, ArchiveReader& archive, const WorldBounds& ground,
+                                const std::optional<MapBounds>& box, bool quiet) {
+  std::vector<Warning> warnings;
+  auto system = understand_grid_system(archive, options.system, warnings);
+  if (!quiet) print_warnings(warnings);
+  std::optional<double> spacing;
+  if (options.spacing) {
+    const Georeference& place = system->place;
+    if (options.spacing->in_metres && place.unit == HorizontalUnit::kDegree) {
+      throw Error(
+          ErrorCode::kInvalidArgument,
+          fmt::format("--spacing has a unit, and coordinates of \"{}\" are degrees; give a plain number of these",
+                      place.system.name));
+    }
+    spacing = options.spacing->in_metres ? options.spacing->value / place.metres_per_unit : options.spacing->value;
+  }
+  try {
+    std::optional<SampleGrid> own;
+    if (box && !options.size && !spacing && is_warped(archive.metadata())) {
+      own = own_grid_in_box(archive.metadata(), *system, *box);
+      if (own) own->system = system;
+    }
+    const SampleGrid grid =
+        own ? *own : grid_in_system(archive.metadata(), ground, std::move(system), options.size, spacing);
+    if (grid.goes_by_places() && options.given_method == RestoreMethod::kHex) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  "--crs: rows of another reference system are no rows of the archive, along which --method hex goes; "
+                  "leave it out, or give --method barycentric");
+    }
+    if (grid.width <= kMostSide && grid.height <= kMostSide) return grid;
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("--spacing makes {} x {} samples, at most {} a side are "
+                                                         "possible",
+                                                         grid.width, grid.height, kMostSide));
+  } catch (const Error& error) {
+    throw error.within(options.archive);
+  }
+}
+
+/// The spacing asked for in the archive's world units. Throws Error{kInvalidArgument} for metres where these are
+/// unknown.
+std::optional<double> spacing_in_world(const ExportOptions& options, const Metadata& metadata) {
+  if (!options.spacing) return std::nullopt;
+  if (options.spacing->in_metres && metadata.horizontal_unit != "metre") {
+    throw Error(ErrorCode::kInvalidArgument,
+                options.archive +
+                    ": --spacing has a unit, but the archive's world units are not known; give a plain "
+                    "number of these");
+  }
+  const WorldBounds& ground = metadata.valid;
+  const double samples = std::max(ground.x1 - ground.x0, ground.z1 - ground.z0) / options.spacing->value;
+  if (!(samples <= static_cast<double>(kMostSide))) {
+    throw Error(ErrorCode::kInvalidArgument,
+                {"--spacing", fmt::format("{}, for {:.3g} samples along a side", options.spacing->value, samples),
+                 fmt::format("wide enough for {} at most", kMostSide), ""});
+  }
+  return options.spacing->value;
 }
 
 struct ExportGrid {
@@ -127,10 +290,12 @@ ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
   const auto box =
       asked ? std::optional(MapBounds{asked->west, asked->south, asked->east, asked->north}) : std::nullopt;
   ExportGrid grid;
-  if (!options.raster.system.empty()) {
-    grid.samples = asked_grid_in_system(options.raster, archive, ground, box, false);
-  } else if (options.raster.size || options.raster.spacing) {
-    grid.samples = grid_over(ground, area, options.raster.size, spacing_in_world(options.raster, metadata));
+  if (!options.like.empty()) {
+    grid.samples = grid_of_other(options, metadata);
+  } else if (!options.system.empty()) {
+    grid.samples = asked_grid_in_system(options, archive, ground, box, false);
+  } else if (options.size || options.spacing) {
+    grid.samples = grid_over(ground, area, options.size, spacing_in_world(options, metadata));
   } else {
     grid.samples = natural_grid(metadata);
     if (options.bbox) {
@@ -143,11 +308,10 @@ ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
     }
   }
   GridSize size{grid.samples.width, grid.samples.height};
-  grid.cut = cut_into_tiles(size, !options.raster.size && !options.raster.spacing, options.tiles, options.tile_size,
-                            options.overlap);
+  grid.cut = cut_into_tiles(size, !options.size && !options.spacing, options.tile_size, options.overlap);
   if (size != GridSize{grid.samples.width, grid.samples.height}) {
     if (grid.samples.system) {
-      RasterOptions sized = options.raster;
+      ExportOptions sized = options;
       sized.size = size;
       grid.samples = asked_grid_in_system(sized, archive, ground, box, true);
       return grid;
@@ -155,18 +319,6 @@ ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
     grid.samples = grid_over(ground, area, size, std::nullopt);
   }
   return grid;
-}
-
-SampleType default_type(const std::string& output) {
-  switch (raster_kind(output)) {
-    case RasterKind::kHgt:
-      return SampleType::kInt16;
-    case RasterKind::kPng:
-    case RasterKind::kRaw16:
-      return SampleType::kUint16;
-    default:
-      return SampleType::kFloat32;
-  }
 }
 
 class Exporter {
@@ -177,14 +329,30 @@ class Exporter {
         grid_(grid),
         display_(options.work.progress, options.common.quiet, options.common.verbose) {}
 
-  void run() {
-    has_voids = needs_void(archive_.metadata(), grid_.samples, options_.raster.output);
+  void run(bool is_lossless) { is_lossless ? run_lossless() : run_surface(); }
+
+  SampleMapping mapping;
+  SampleStore::Result counts;
+  bool has_voids = false;
+  std::int64_t files = 0;
+  std::vector<std::string> written;  ///< those beside them as well
+
+ private:
+  void run_lossless() {
+    const SourceSamplesTarget target{options_.output, options_.type, options_.overwrite, scratch_of(options_.work)};
+    WrittenSamples samples = write_source_samples(archive_, target, job("export"));
+    mapping = samples.mapping;
+    written = std::move(samples.files);
+    files = 1;
+  }
+
+  void run_surface() {
+    has_voids = needs_void(archive_.metadata(), grid_.samples, options_.output);
     mapping = choose_mapping();
     const auto void_value = void_value_of(mapping.type, has_voids);
-    const SampleStore store(mapping, void_value,
-                            options_.raster.clamp_range ? SampleStore::Clamp::kAll : SampleStore::Clamp::kNone);
-    const RasterTarget target{options_.raster.output, mapping, remedy()};
-    ExportTiles tiles(options_.raster.output, grid_.cut, grid_.samples.width);
+    const SampleStore store(mapping, void_value, clamp());
+    const RasterTarget target{options_.output, mapping, remedy()};
+    ExportTiles tiles(options_.output, grid_.cut, grid_.samples.width);
     const auto spec_of = [&](std::int64_t column, std::int64_t row) {
       SampleGrid part = grid_.samples;
       part.width = grid_.cut.columns;
@@ -201,11 +369,11 @@ class Exporter {
         place.origin_x = part.first_x * (place.spacing_x / part.spacing_x);
         place.origin_y = -part.first_z * (place.spacing_y / part.spacing_z);
       }
-      spec.overwrite = options_.raster.overwrite;
+      spec.overwrite = options_.overwrite;
       spec.scratch = scratch_of(options_.work);
       return spec;
     };
-    warn_of_losses(options_.raster.output, spec_of(0, 0));
+    warn_of_losses(options_.output, spec_of(0, 0));
     for (std::int64_t group = 0; group < tiles.groups(); ++group) {
       tiles.begin_group(group, spec_of);
       counts = {};
@@ -218,20 +386,19 @@ class Exporter {
     }
     files = tiles.files();
     written = tiles.written();
+    if (counts.clamped == 0 || options_.clamp_range) return;
+    display_.clear();
+    print_warning(
+        fmt::format("{}: the surface overshoots the {} of its source at {} samples; they were moved to its ends",
+                    options_.output, to_string(mapping.type), describe_count(counts.clamped)));
   }
 
-  SampleMapping mapping;
-  SampleStore::Result counts;
-  bool has_voids = false;
-  std::int64_t files = 0;
-  std::vector<std::string> written;  ///< those beside them as well
-
- private:
   /// Also of an archive without a place: what lies beside others must say where, and grids always do. All of it in
   /// another format has none, as its source had.
   [[nodiscard]] bool says_place() const {
-    const RasterKind kind = raster_kind(options_.raster.output);
-    return grid_.cut.asked || options_.bbox || kind == RasterKind::kAsc || kind == RasterKind::kFlt;
+    const RasterKind kind = raster_kind(options_.output);
+    return grid_.cut.asked || options_.bbox ||
+           (!options_.as_source() && (kind == RasterKind::kAsc || kind == RasterKind::kFlt));
   }
   Job job(const char* stage) {
     Job made = job_from(options_.work, display_);
@@ -244,7 +411,7 @@ class Exporter {
 
   [[nodiscard]] std::string remedy() const {
     const Metadata& metadata = archive_.metadata();
-    const std::string& output = options_.raster.output;
+    const std::string& output = options_.output;
     if (options_.z_scale || options_.z_offset) {
       const std::string scale = scale_that_holds(metadata.statistics, mapping, has_voids);
       if (!scale.empty())
@@ -255,25 +422,40 @@ class Exporter {
     return text;
   }
 
+  /// The source's, where its type and scale are kept; its decimals are spread over an integer type.
+  SampleMapping source_mapping() {
+    const Metadata& metadata = archive_.metadata();
+    const SampleMapping found{options_.written_type(metadata), metadata.source.z_scale, metadata.source.z_offset};
+    if (!takes_decimals(metadata, found)) return found;
+    if (has_scale(options_.output)) return spread_over_range(found.type);
+    warn_of_whole_numbers(options_.output, metadata);
+    return found;
+  }
+
   SampleMapping choose_mapping() {
-    const SampleType type = options_.raster.type.value_or(default_type(options_.raster.output));
+    if (options_.as_source()) return source_mapping();
+    const SampleType type = options_.written_type(archive_.metadata());
     if (options_.z_scale || options_.z_offset) {
       return {type, options_.z_scale.value_or(1.0), options_.z_offset.value_or(0.0)};
     }
-    if (is_floating(type)) {
-      if (options_.z_range)
-        throw Error(ErrorCode::kInvalidArgument, "export: --z-range is for integer types; floats hold elevations");
-      if (type == SampleType::kFloat16) warn_of_halves(options_.raster.output, archive_.metadata());
-      return {type, 1.0, 0.0};
-    }
-    if (options_.z_range) return spread(type, *options_.z_range, has_voids);
+    if (type == SampleType::kFloat16) warn_of_halves(options_.output, archive_.metadata());
+    if (type == SampleType::kUint8 || type == SampleType::kUint16) return spread_over_range(type);
     const SampleMapping whole{type, 1.0, 0.0};
-    if (type == SampleType::kUint8 || type == SampleType::kUint16) {
-      const Job reading = job("range");
-      return spread_over(type, rows(reading), reading, has_voids);
-    }
-    if (takes_decimals(archive_.metadata(), whole)) warn_of_whole_numbers(options_.raster.output, archive_.metadata());
+    if (takes_decimals(archive_.metadata(), whole)) warn_of_whole_numbers(options_.output, archive_.metadata());
     return whole;
+  }
+
+  SampleMapping spread_over_range(SampleType type) {
+    const Job reading = job("range");
+    return spread_over(type, rows(reading), reading, has_voids);
+  }
+
+  /// All samples of the source are of its type: what lies beyond its ends is overshoot.
+  [[nodiscard]] SampleStore::Clamp clamp() const {
+    if (options_.clamp_range) return SampleStore::Clamp::kAll;
+    const bool is_source_type =
+        options_.as_source() && mapping.type == sample_type_from_string(archive_.metadata().source.sample_type);
+    return is_source_type ? SampleStore::Clamp::kAtFreeEnds : SampleStore::Clamp::kNone;
   }
 
   const ExportOptions& options_;
@@ -283,37 +465,48 @@ class Exporter {
 };
 
 int run(const ExportOptions& options) {
-  ArchiveReader archive = open_with_source(options.raster.archive);
-  const ExportGrid grid = asked_grid(options, archive);
+  std::vector<std::string> inputs = {options.archive};
+  if (!options.like.empty()) {
+    for (std::string& file : expand_inputs({options.like}, false)) inputs.push_back(std::move(file));
+  }
+  ArchiveReader archive = open_with_source(options.archive);
+  const Metadata& metadata = archive.metadata();
+  const bool is_lossless = options.as_source() && options.like.empty() && lossless_record(metadata);
+  ExportGrid grid;
+  if (is_lossless) {
+    const SampleGrid source = source_grid(metadata.source);
+    grid = {source, {1, 1, source.width, source.height}};
+  } else {
+    grid = asked_grid(options, archive);
+  }
   RasterSpec spec;
   spec.width = grid.cut.columns;
   spec.height = grid.cut.rows;
-  spec.sample_type = options.raster.type.value_or(default_type(options.raster.output));
-  spec.overwrite = options.raster.overwrite;
-  check_raster_room(options.raster.output, spec, grid.cut.across * grid.cut.down);
-  const std::vector<std::string> names = ExportTiles(options.raster.output, grid.cut, grid.samples.width).names();
-  for (const std::string& file : names) {
-    check_raster_output({options.raster.archive}, file, options.raster.overwrite);
-  }
+  spec.sample_type = options.written_type(metadata);
+  spec.overwrite = options.overwrite;
+  check_raster_room(options.output, spec, grid.cut.across * grid.cut.down);
+  const std::vector<std::string> names = ExportTiles(options.output, grid.cut, grid.samples.width).names();
+  for (const std::string& file : names) check_raster_output(inputs, file, options.overwrite);
   // What the format does not hold is refused before elevations are looked at.
   (void)create_raster(names.front(), spec);
   Exporter exporter(options, archive, grid);
   WorkArena arena(options.work.threads);
-  arena.execute([&] { exporter.run(); });
+  arena.execute([&] { exporter.run(is_lossless); });
   const SampleGrid& samples = grid.samples;
   const SampleMapping& mapping = exporter.mapping;
-  if (exporter.counts.nodata > 0 && raster_kind(options.raster.output) == RasterKind::kRaw16) {
-    print_warning(
-        fmt::format("{}: {} voids are written as {}, which an engine takes for a height; `convert --fill` "
-                    "closes voids",
-                    options.raster.output, describe_count(exporter.counts.nodata),
-                    void_value_of(mapping.type, true).value_or(0.0)));
+  const RestoreMethod method = options.method(metadata, samples);
+  if (exporter.counts.nodata > 0 && raster_kind(options.output) == RasterKind::kRaw16) {
+    print_warning(fmt::format(
+        "{}: {} voids are written as {}, which an engine takes for a height; `convert --fill` "
+        "closes voids",
+        options.output, describe_count(exporter.counts.nodata), void_value_of(mapping.type, true).value_or(0.0)));
   }
   StandardOutput out;
   if (options.common.json) {
-    out.write(json_text({{"archive", options.raster.archive},
-                         {"output", options.raster.output},
-                         {"method", to_string(options.method(archive.metadata(), samples))},
+    out.write(json_text({{"archive", options.archive},
+                         {"output", options.output},
+                         {"source_samples", is_lossless},
+                         {"method", is_lossless ? "source" : to_string(method)},
                          {"width", samples.width},
                          {"height", samples.height},
                          {"first_sample", {{"x", samples.first_x}, {"z", samples.first_z}}},
@@ -329,7 +522,7 @@ int run(const ExportOptions& options) {
                          {"sample_type", to_string(mapping.type)},
                          {"z_scale", mapping.z_scale},
                          {"z_offset", mapping.z_offset},
-                         {"voids", exporter.counts.nodata},
+                         {"voids", is_lossless ? ordered_json(nullptr) : ordered_json(exporter.counts.nodata)},
                          {"clamped", exporter.counts.clamped}}));
   } else if (!options.common.quiet) {
     std::string what = fmt::format("{} x {} samples of {}, {:.6g} x {:.6g} apart", samples.width, samples.height,
@@ -341,14 +534,16 @@ int run(const ExportOptions& options) {
     if (mapping.z_scale != 1.0 || mapping.z_offset != 0.0) {
       what += fmt::format("; elevation = sample * {} + {}", mapping.z_scale, mapping.z_offset);
     }
-    if (options.method(archive.metadata(), samples) == RestoreMethod::kPlane) {
+    if (is_lossless) {
+      what += ", the source's own, SHA-256 as stated";
+    } else if (method == RestoreMethod::kPlane) {
       what += kOnAPlane;
     }
     if (exporter.counts.nodata > 0) what += fmt::format(", {} voids", describe_count(exporter.counts.nodata));
     if (exporter.counts.clamped > 0) {
       what += fmt::format(", {} moved into the range", describe_count(exporter.counts.clamped));
     }
-    const std::string& written = exporter.files == 1 ? exporter.written.front() : options.raster.output;
+    const std::string& written = exporter.files == 1 ? exporter.written.front() : options.output;
     out.write(fmt::format("{}: {}\n", written, what));
   }
   out.finish();

@@ -292,12 +292,12 @@ std::string describe_archive(const ArchiveReader& archive) {
                                 info->photo_name, info->photo_width, info->photo_height, info->placed_by));
   }
   if (const auto record = lossless_record(metadata)) {
-    say("lossless", fmt::format("restore gives the {} samples bit for bit; residuals of {}, {:.3f} bits a sample",
+    say("lossless", fmt::format("export gives the {} samples bit for bit; residuals of {}, {:.3f} bits a sample",
                                 source.sample_type, describe_bytes(record->residual_bytes),
                                 8.0 * static_cast<double>(record->residual_bytes) /
                                     (static_cast<double>(record->width) * static_cast<double>(record->height))));
   } else {
-    say("lossless", "no: restore resamples the surface");
+    say("lossless", "no: export resamples the surface");
   }
   const std::string members = describe_members(archive);
   say("members", members + (members.empty() ? "" : " beside the tiles"));

@@ -191,7 +191,7 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
               [&](const std::string& text) { sun_min_deg = parse_number(text); });
   add_texture_options(line, options.texture);
   line.group("Residuals");
-  line.flag("--lossless", "Keep residuals as well, so that restore gives INPUT's samples bit for bit",
+  line.flag("--lossless", "Keep residuals as well, so that export gives INPUT's samples bit for bit",
             options.convert.lossless);
   line.group("Report");
   line.option_or_value(

@@ -302,48 +302,24 @@ class ImageFinder {
   double reach_x_ = 1.0;     ///< East and West so many times as far
 };
 
-/// One axis of the cut: how many tiles, and of how many samples.
-struct AxisCut {
-  std::int64_t tiles = 1;
-  std::int64_t samples = 0;
-};
-
-AxisCut cut_axis(std::int64_t& size, bool free, std::optional<std::int64_t> tiles, std::optional<std::int64_t> samples,
-                 std::int64_t overlap, const char* axis) {
-  const auto own = [&](std::int64_t of_tile) {
-    if (of_tile <= overlap || of_tile < 2 * overlap) {
-      throw Error(
-          ErrorCode::kInvalidArgument,
-          fmt::format("tiles of {} {} with an overlap of {}: a tile must have at least twice the overlap, and one "
-                      "sample of its own",
-                      of_tile, axis, overlap));
-    }
-    return of_tile - overlap;
-  };
-  if (samples) {
-    const std::int64_t step = own(*samples);
-    const auto near = std::max<std::int64_t>((size - overlap + step / 2) / step, 1);
-    const std::int64_t count = tiles.value_or(near);
-    const std::int64_t whole = count * step + overlap;
-    if (free) size = whole;
-    if (size != whole) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("{} {} do not make {} whole tiles of {} that share {}; {} do", size, axis, count,
-                              *samples, overlap, whole));
-    }
-    return {count, *samples};
+/// One axis of the cut: how many tiles of so many samples.
+std::int64_t cut_axis(std::int64_t& size, bool free, std::int64_t samples, std::int64_t overlap, const char* axis) {
+  if (samples <= overlap || samples < 2 * overlap) {
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("tiles of {} {} with an overlap of {}: a tile must have at least twice the overlap, and one "
+                    "sample of its own",
+                    samples, axis, overlap));
   }
-  const std::int64_t count = tiles.value_or(1);
-  const std::int64_t all = size - overlap;
-  if (all < count || (all % count != 0 && !free)) {
-    const std::int64_t step = std::max<std::int64_t>((all + count / 2) / count, overlap + 1);
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("{} {} do not make {} equal tiles that share {}; {} do", size,
-                                                         axis, count, overlap, count * step + overlap));
+  const std::int64_t step = samples - overlap;
+  const auto count = std::max<std::int64_t>((size - overlap + step / 2) / step, 1);
+  const std::int64_t whole = count * step + overlap;
+  if (free) size = whole;
+  if (size != whole) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("{} {} do not make {} whole tiles of {} that share {}; {} do",
+                                                         size, axis, count, samples, overlap, whole));
   }
-  const std::int64_t of_tile = (all + count / 2) / count + overlap;
-  (void)own(of_tile);
-  if (free) size = (of_tile - overlap) * count + overlap;
-  return {count, of_tile};
+  return count;
 }
 
 }  // namespace
@@ -722,17 +698,11 @@ std::optional<SampleGrid> grid_like(const Metadata& metadata, const SourceInfo& 
                     theirs.spacing_y * to_z};
 }
 
-TileCut cut_into_tiles(GridSize& size, bool free, const std::optional<GridSize>& count,
-                       const std::optional<GridSize>& tile_size, std::int64_t overlap) {
-  const auto first = [](const std::optional<GridSize>& pair) {
-    return pair ? std::optional(pair->first) : std::nullopt;
-  };
-  const auto second = [](const std::optional<GridSize>& pair) {
-    return pair ? std::optional(pair->second) : std::nullopt;
-  };
-  const AxisCut x = cut_axis(size.first, free, first(count), first(tile_size), overlap, "columns");
-  const AxisCut z = cut_axis(size.second, free, second(count), second(tile_size), overlap, "rows");
-  return {x.tiles, z.tiles, x.samples, z.samples, overlap, count || tile_size};
+TileCut cut_into_tiles(GridSize& size, bool free, const std::optional<GridSize>& tile_size, std::int64_t overlap) {
+  if (!tile_size) return {1, 1, size.first, size.second};
+  const std::int64_t across = cut_axis(size.first, free, tile_size->first, overlap, "columns");
+  const std::int64_t down = cut_axis(size.second, free, tile_size->second, overlap, "rows");
+  return {across, down, tile_size->first, tile_size->second, overlap, true};
 }
 
 }  // namespace isohf

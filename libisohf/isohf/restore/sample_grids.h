@@ -72,9 +72,8 @@ struct TileCut {
 /// How a raster of `size` samples is cut. Where `free` is set the user gave no size: that of the nearest number of whole
 /// tiles is taken, into `size`. Throws Error{kInvalidArgument} naming the nearest sizes where tiles do not come out
 /// whole, and where overlap leaves a tile nothing of its own.
-/// count      tiles across and down; nullopt: as many as fit
-/// tile_size  samples of a tile; nullopt: the size divided
-[[nodiscard]] TileCut cut_into_tiles(GridSize& size, bool free, const std::optional<GridSize>& count,
-                                     const std::optional<GridSize>& tile_size, std::int64_t overlap);
+/// tile_size  samples of a tile; nullopt: the raster stays whole
+[[nodiscard]] TileCut cut_into_tiles(GridSize& size, bool free, const std::optional<GridSize>& tile_size,
+                                     std::int64_t overlap);
 
 }  // namespace isohf

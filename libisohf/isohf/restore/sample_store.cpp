@@ -78,8 +78,7 @@ SampleStore::Result SampleStore::store(std::span<const double> elevations, std::
 }
 
 std::optional<std::size_t> convert_exactly(const LosslessRecord& record, std::span<const std::byte> raw,
-                                           std::optional<double> nodata, SampleType to, std::span<std::byte> out,
-                                           double* largest_error) {
+                                           std::optional<double> nodata, SampleType to, std::span<std::byte> out) {
   const SampleType from = record.mapping.type;
   const SampleStore store({to, 1.0, 0.0}, std::nullopt, SampleStore::Clamp::kNone);
   const std::size_t count = raw.size() / size_bytes(from);
@@ -89,16 +88,11 @@ std::optional<std::size_t> convert_exactly(const LosslessRecord& record, std::sp
   for (std::size_t i = 0; i < count; ++i) {
     const double value = load(raw.data() + i * size_bytes(from));
     std::byte* const at = out.data() + i * size_bytes(to);
-    const bool is_nodata = record.is_void(value);
-    const double written = is_nodata ? nodata.value_or(value) : value;
+    const double written = record.is_void(value) ? nodata.value_or(value) : value;
     const SampleStore::Outcome outcome = store.store(written, at);
     if (outcome == SampleStore::Outcome::kNodata) continue;
     if (outcome != SampleStore::Outcome::kStored) return i;
-    const double error = std::abs(load_again(at) - written);
-    if (error == 0.0) continue;
-    // A void value that came out as another number would be an elevation.
-    if (largest_error == nullptr || !is_floating(to) || !std::isfinite(error) || is_nodata) return i;
-    *largest_error = std::max(*largest_error, error);
+    if (load_again(at) != written) return i;
   }
   return std::nullopt;
 }

@@ -52,12 +52,10 @@ class SampleStore {
 };
 
 /// Raw samples of a record in another type, number for number; those that are void as `nodata`, where that is given.
-/// raw [n samples of the record's type]   out [n samples of `to`]. Returns the first that `to` does not hold. largest_error
-/// given: decimals that a floating `to` does not hold are rounded to nearest, and it becomes the largest difference if that
-/// is more.
+/// raw [n samples of the record's type]   out [n samples of `to`]. Returns the first that `to` does not hold.
 [[nodiscard]] std::optional<std::size_t> convert_exactly(const LosslessRecord& record, std::span<const std::byte> raw,
                                                          std::optional<double> nodata, SampleType to,
-                                                         std::span<std::byte> out, double* largest_error = nullptr);
+                                                         std::span<std::byte> out);
 
 /// Raw samples as the elevations that they mean, NaN where void: decimals where the scale is one over a whole number.
 /// raw [n samples of the record's type]   out [n doubles]

@@ -135,7 +135,7 @@ TEST_F(MosaicCommand, WithoutANameTheArchiveSaysWhatItWasJoinedFrom) {
 TEST_F(MosaicCommand, RestoringALosslessMosaicGivesTheWholeRaster) {
   const CutRaster raster = hills(placed_spec(190, 140, SampleType::kInt16, Registration::kArea));
   convert(write_pieces(raster, folder / "", ragged_cut(190, 140, 6, 12)), {"--lossless"});
-  const RunResult result = run_isohf({"restore", folder / "out.isohf", folder / "back.tif"});
+  const RunResult result = run_isohf({"export", folder / "out.isohf", folder / "back.tif"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const auto back = open_raster(folder / "back.tif", {});
   ASSERT_EQ(back->info().width, 190);
@@ -370,7 +370,7 @@ TEST_F(MosaicCommand, RealDegreeTilesJoin) {
   const std::int64_t side = west->info().width;
   EXPECT_EQ(metadata().at("source").at("width"), 2 * side - 1);
   EXPECT_EQ(metadata().at("source").at("crs").at("origin_x"), 6.0);
-  ASSERT_EQ(run_isohf({"restore", folder / "out.isohf", folder / "back.tif", "-q"}).exit_code, 0);
+  ASSERT_EQ(run_isohf({"export", folder / "out.isohf", folder / "back.tif", "-q"}).exit_code, 0);
   const auto back = open_raster(folder / "back.tif", {});
   const auto rows = static_cast<std::size_t>(side * side * 2);
   std::vector<std::byte> expected(rows);

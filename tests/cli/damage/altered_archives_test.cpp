@@ -325,7 +325,7 @@ TEST(AlteredArchives, NoProgramCrashesOnThem) {
     const std::vector<std::vector<std::string>> commands = {
         {"info", folder / "a.isohf"},
         {"verify", folder / "a.isohf"},
-        {"restore", folder / "a.isohf", folder / "r.tif"},
+        {"export", folder / "a.isohf", folder / "r.tif"},
         {"export", folder / "a.isohf", folder / "e.tif", "--size", "20x20"},
         {"shade", folder / "a.isohf", "-o", folder / "s.png", "--size", "20x20"},
         {"sample", folder / "a.isohf", "--at", "100", "100"}};
@@ -374,7 +374,7 @@ TEST(AlteredArchives, MembersThatInflateAThousandfoldTakeNoMemory) {
   EXPECT_EQ(verified.exit_code, 3) << verified.err;
   EXPECT_THAT(verified.out, testing::AllOf(HasSubstr("residual/00000000"), HasSubstr("too many for")));
   EXPECT_THAT(verified.out + verified.err, testing::Not(HasSubstr("memory")));
-  const RunResult restored = run_isohf({"restore", folder / "a.isohf", folder / "r.tif", "-j", "1"}, limits);
+  const RunResult restored = run_isohf({"export", folder / "a.isohf", folder / "r.tif", "-j", "1"}, limits);
   EXPECT_EQ(restored.exit_code, 3) << restored.err;
   EXPECT_THAT(restored.err, HasSubstr("too many for"));
 }
@@ -394,7 +394,7 @@ TEST(RestoreSpacing, ASpacingBeyondTheSurfaceIsRefused) {
   for (const char* method : {"hex", "barycentric"}) {
     for (const char* spacing : {"1e21", "1e300"}) {
       const RunResult result =
-          run_isohf({"restore", kKept + "u16.isohf", folder / "a.tif", "--spacing", spacing, "--method", method});
+          run_isohf({"export", kKept + "u16.isohf", folder / "a.tif", "--spacing", spacing, "--method", method});
       EXPECT_EQ(result.exit_code, 2) << result.err;
       EXPECT_THAT(result.err, HasSubstr("is wider than the ground"));
       EXPECT_THAT(folder.names(), testing::IsEmpty());

@@ -55,11 +55,10 @@ TEST_F(SilentFailures, ADryRunRefusesTheMemoryThatTheRunRefuses) {
 TEST_F(SilentFailures, ASingleTileIsNamedLikeItsLikes) {
   run({"convert", kVoids, "a.isohf", "-q"});
   run({"export", "a.isohf", "one.npy", "--tile-size", "200x150", "-q"});
-  run({"export", "a.isohf", "two.npy", "--tiles", "1x1", "-q"});
-  run({"export", "a.isohf", "whole.npy", "-q"});
-  EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.isohf", "one_x0_y0.npy", "two_x0_y0.npy", "whole.npy"}));
+  run({"export", "a.isohf", "whole.npy", "--method", "hex", "-q"});
+  EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.isohf", "one_x0_y0.npy", "whole.npy"}));
   EXPECT_EQ(read_file(folder / "one_x0_y0.npy"), read_file(folder / "whole.npy"));
-  EXPECT_THAT(run({"export", "a.isohf", "three.npy", "--tiles", "1x1"}).out, HasSubstr("three_x0_y0.npy: "));
+  EXPECT_THAT(run({"export", "a.isohf", "two.npy", "--tile-size", "200x150"}).out, HasSubstr("two_x0_y0.npy: "));
 }
 
 TEST_F(SilentFailures, NamesThatAreNoUtf8AreKeptAsLatin1AndVerify) {
@@ -96,7 +95,7 @@ TEST_F(SilentFailures, VoidsBeyondTheValidRangeAreVoidInWhatRestoreWrites) {
   file.variable("z", {0, 1}, 3, samples, {}, {{"_FillValue", {32767.0}}, {"valid_max", {9000.0}}});
   write_file(folder / "a.nc", file.bytes());
   run({"convert", "a.nc", "a.isohf", "--lossless", "-q"});
-  const RunResult restored = run({"restore", "a.isohf", "a.tif"});
+  const RunResult restored = run({"export", "a.isohf", "a.tif"});
   EXPECT_EQ(restored.err, "");
   EXPECT_THAT(run({"info", "a.tif", "--stats"}).out, HasSubstr("1 of them void"));
 }
@@ -131,14 +130,14 @@ TEST_F(SilentFailures, AFolderHoldsRastersInZipFilesOfAnyName) {
 TEST_F(SilentFailures, LikeAGridWithoutAReferenceSystemKeepsItsPlace) {
   run({"convert", kVoids, "a.isohf", "-q"});
   run({"export", "a.isohf", "part.asc", "--bbox", "301500,5297000,304500,5299000", "-q"});
-  run({"restore", "a.isohf", "with.npy", "--like", "part.asc", "-q"});
+  run({"export", "a.isohf", "with.npy", "--like", "part.asc", "-q"});
   std::filesystem::remove(folder / "part.prj");
-  const RunResult result = run({"restore", "a.isohf", "without.npy", "--like", "part.asc"});
+  const RunResult result = run({"export", "a.isohf", "without.npy", "--like", "part.asc"});
   EXPECT_THAT(result.err,
               HasSubstr("part.asc: does not say what its coordinates count (a .prj would); they are taken"));
   EXPECT_EQ(read_file(folder / "without.npy"), read_file(folder / "with.npy"));
   write_file(folder / "far.asc", "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 30\n1 2 3\n4 5 6\n");
-  EXPECT_THAT(run({"restore", "a.isohf", "far.npy", "--like", "far.asc"}).err, HasSubstr("North-West corner"));
+  EXPECT_THAT(run({"export", "a.isohf", "far.npy", "--like", "far.asc"}).err, HasSubstr("North-West corner"));
 }
 
 /// What a message says to type makes voids of what it names, and of what was void before.

@@ -201,9 +201,10 @@ class GeographicCombinations : public testing::Test {
     RecordProperty("worst", std::to_string(worst));
   }
 
-  void export_and_restore_hold(const Combination& at, const std::function<bool(double, double)>& inside) {
-    for (const char* command : {"export", "restore"}) {
-      const RunResult made = run_isohf({command, folder / "a.isohf", folder / "a.tif", "--overwrite"});
+  /// The source's samples, and the surface's.
+  void exports_hold(const Combination& at, const std::function<bool(double, double)>& inside) {
+    for (const Words& more : {Words{}, Words{"--z-scale", "1"}}) {
+      const RunResult made = run_with({"export", folder / "a.isohf", folder / "a.tif", "--overwrite"}, more);
       ASSERT_EQ(made.exit_code, 0) << made.err;
       EXPECT_EQ(made.err, "");
       raster_holds(at, folder / "a.tif", inside);
@@ -252,7 +253,7 @@ TEST_F(GeographicCombinations, PiecesBoxesGeoidsAndFillsGoThroughEveryProjection
       const double north = box ? 47.9 : 48.2;
       // Three cells from the edge nothing of what goes on beyond it is left; around the hole triangles are void or
       // filled.
-      ASSERT_NO_FATAL_FAILURE(export_and_restore_hold(at, [&](double longitude, double latitude) {
+      ASSERT_NO_FATAL_FAILURE(exports_hold(at, [&](double longitude, double latitude) {
         return longitude > west + 0.15 && longitude < east - 0.15 && latitude > south + 0.15 &&
                latitude < north - 0.15 && std::hypot(longitude - kHole.longitude, latitude - kHole.latitude) > 0.4;
       }));
@@ -284,7 +285,7 @@ TEST_F(GeographicCombinations, AGlobeHasNoSeamAtTheAntimeridian) {
         at, {{180.0, 0.0}, {-180.0, 40.0}, {-179.3, -30.0}, {179.3, -30.0}, {179.99, 10.0}, {0.0, 50.0}}, kHole));
     const double south = box ? -60.0 : -90.0;
     const double north = box ? 70.0 : 90.0;
-    ASSERT_NO_FATAL_FAILURE(export_and_restore_hold(at, [&](double longitude, double latitude) {
+    ASSERT_NO_FATAL_FAILURE(exports_hold(at, [&](double longitude, double latitude) {
       return latitude > south + 6.2 && latitude < north - 6.2 &&
              std::hypot(distance_in_turn(longitude, kHole.longitude), latitude - kHole.latitude) > 11.0;
     }));
@@ -301,7 +302,7 @@ TEST_F(GeographicCombinations, LosslessKeepsTheFilesOwnSamplesBehindBoxAndFill) 
                          "--wrap-x",     "--bbox",          "-180,-50,185,60", "--lossless"};
   const RunResult made = run_with({"convert", folder / "pieces", folder / "a.isohf"}, options);
   ASSERT_EQ(made.exit_code, 0) << made.err;
-  const RunResult restored = run_isohf({"restore", folder / "a.isohf", folder / "a.tif"});
+  const RunResult restored = run_isohf({"export", folder / "a.isohf", folder / "a.tif"});
   ASSERT_EQ(restored.exit_code, 0) << restored.err;
   const auto raster = open_raster(folder / "a.tif", {});
   ASSERT_EQ(raster->info().width, 72) << "without the repeated column";

@@ -83,7 +83,7 @@ void expect_restored(const fs::path& file, const TemporaryFolder& folder) {
   if (const std::string layout = raw_layout(file); !layout.empty()) convert.insert(convert.end(), {"--raw", layout});
   const RunResult converted = run_isohf(convert);
   ASSERT_EQ(converted.exit_code, 0) << converted.err;
-  const RunResult restored = run_isohf({"restore", archive, back, "--overwrite", "--quiet"});
+  const RunResult restored = run_isohf({"export", archive, back, "--overwrite", "--quiet"});
   ASSERT_EQ(restored.exit_code, 0) << restored.err;
   EXPECT_EQ(restored.out + restored.err, "");
   if (lower_extension(file) == ".hgt") {
@@ -167,7 +167,7 @@ TEST(LosslessOptions, EveryWayOfConvertingGivesTheSamplesBack) {
     const RunResult converted = run_isohf(convert);
     ASSERT_EQ(converted.exit_code, 0) << converted.err;
     const std::string back = folder / restored_name(input);
-    const RunResult restored = run_isohf({"restore", folder / "a.isohf", back, "--overwrite", "--quiet"});
+    const RunResult restored = run_isohf({"export", folder / "a.isohf", back, "--overwrite", "--quiet"});
     ASSERT_EQ(restored.exit_code, 0) << restored.err;
     EXPECT_TRUE(read_raster(back).raw == read_raster(input).raw);
     const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--quiet"});

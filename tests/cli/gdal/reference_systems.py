@@ -275,7 +275,7 @@ def cell_read(isohf, source, archive, restored, kept_source):
     code, said = run(isohf, "convert", source, archive, "--quiet", "--projection", "none")
     if code != 0:
         return "refused", said
-    code, warned = run(isohf, "restore", archive, restored, "--quiet")
+    code, warned = run(isohf, "export", archive, restored, "--quiet")
     if code != 0:
         return "refused", warned
     try:
@@ -319,7 +319,7 @@ def cells_of(isohf, folder, index, system, chosen):
         if kept_archive is None:
             row[writer] = ("-", "")
             continue
-        code, said = run(isohf, "export", kept_archive, written, "--quiet")
+        code, said = run(isohf, "export", kept_archive, written, "--quiet", "--method", "hex")
         if code != 0:
             row[writer] = ("refused", said)
             continue
@@ -368,10 +368,10 @@ def lost_by_real_files(isohf, folder, names):
         archive = str(folder / (name.name + ".isohf"))
         code, said = run(isohf, "convert", str(name), archive, "--quiet", "--projection", "none", "--overwrite")
         found[name.name] = [said] if code != 0 else []
-        for command in ("restore", "export") if code == 0 else ():
-            written = str(folder / f"{name.name}_{command}.tif")
-            code, said = run(isohf, command, archive, written, "--quiet", "--overwrite")
-            found[name.name] += [f"{command}: {what}" for what in ([said] if code != 0 else differences(str(name), written))]
+        for options in ([], ["--method", "hex"]) if code == 0 else ():
+            written = str(folder / f"{name.name}_out.tif")
+            code, said = run(isohf, "export", archive, written, "--quiet", "--overwrite", *options)
+            found[name.name] += [f"export {options}: {what}" for what in ([said] if code != 0 else differences(str(name), written))]
     return found, without, refused
 
 

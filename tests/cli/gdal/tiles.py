@@ -141,7 +141,7 @@ class Tiles(Program):
         """Samples, voids and place of all tiles of a level, as GDAL reads what comes back."""
         archive, raster = self.folder / "a.isohf", self.folder / "a.tif"
         for arguments in (("convert", source, "-o", archive, "--overwrite", "--lossless", "--projection", "none", "-q",
-                           *options), ("restore", archive, raster, "--overwrite", "-q")):
+                           *options), ("export", archive, raster, "--overwrite", "-q")):
             done = self.run(*arguments)
             if done.returncode != 0:
                 return check(False, f"isohf {' '.join(map(str, arguments))}: {done.stderr.strip()}")

@@ -71,9 +71,9 @@ TEST_F(CrsOption, PlacesRastersWithoutASystem) {
   const RunResult answer = run_isohf({"sample", archive_, "--at-crs", "600", "600", "--with-lonlat"});
   EXPECT_EQ(answer.exit_code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr(" -121.48")) << "half a million metres West of the zone's meridian, 117 W";
-  ASSERT_EQ(run_isohf({"restore", archive_, folder_ / "back.flt", "--quiet"}).err, "");
+  ASSERT_EQ(run_isohf({"export", archive_, folder_ / "back.flt", "--quiet"}).err, "");
   EXPECT_THAT(read_text(folder_ / "back.prj"), HasSubstr("WGS_1984_UTM_Zone_11N"));
-  ASSERT_EQ(run_isohf({"restore", archive_, folder_ / "back.exr", "--quiet"}).err, "");
+  ASSERT_EQ(run_isohf({"export", archive_, folder_ / "back.exr", "--quiet"}).err, "");
   EXPECT_THAT(read_text(folder_ / "back.erw"), HasSubstr("30\n0\n0\n-30\n15\n1185\n"));
   EXPECT_THAT(read_text(folder_ / "back.exr.aux.xml"), HasSubstr("32611"));
   ASSERT_EQ(run_isohf({"convert", folder_ / "back.exr", folder_ / "b.isohf", "--quiet"}).err, "");
@@ -86,7 +86,7 @@ TEST_F(CrsOption, PlacesRastersWithoutASystem) {
 TEST_F(CrsOption, ReplacesNoForeignSidecar) {
   ASSERT_EQ(convert("EPSG:32611").err, "");
   write_text(folder_ / "x.exr.aux.xml", "<svg/>");
-  const RunResult refused = run_isohf({"restore", archive_, folder_ / "x.exr", "--quiet", "--overwrite"});
+  const RunResult refused = run_isohf({"export", archive_, folder_ / "x.exr", "--quiet", "--overwrite"});
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.err, HasSubstr("x.exr.aux.xml"));
   EXPECT_EQ(read_text(folder_ / "x.exr.aux.xml"), "<svg/>");
@@ -136,8 +136,8 @@ TEST_F(CrsOption, GroundBesideAPoleThatIsALineKeepsItsLongitudes) {
 
 TEST_F(CrsOption, RestoreToTheArchivesOwnSystemAddsNoBorder) {
   ASSERT_EQ(convert("EPSG:32611").err, "");
-  ASSERT_EQ(run_isohf({"restore", archive_, folder_ / "plain.asc", "--quiet"}).err, "");
-  ASSERT_EQ(run_isohf({"restore", archive_, folder_ / "own.asc", "--crs", "EPSG:32611", "--quiet"}).err, "");
+  ASSERT_EQ(run_isohf({"export", archive_, folder_ / "plain.asc", "--quiet"}).err, "");
+  ASSERT_EQ(run_isohf({"export", archive_, folder_ / "own.asc", "--crs", "EPSG:32611", "--quiet"}).err, "");
   EXPECT_EQ(read_text(folder_ / "own.asc"), read_text(folder_ / "plain.asc"));
 }
 
@@ -195,7 +195,7 @@ TEST_F(CrsOption, MapsThatDifferInOneParameterNeverJoin) {
   EXPECT_THAT(apart.err, HasSubstr("reference system"));
   ASSERT_EQ(run_isohf({"convert", folder_ / "west.asc", archive_, "--quiet"}).exit_code, 0);
   const RunResult like =
-      run_isohf({"restore", archive_, folder_ / "like.tif", "--like", folder_ / "east.asc", "--quiet"});
+      run_isohf({"export", archive_, folder_ / "like.tif", "--like", folder_ / "east.asc", "--quiet"});
   EXPECT_NE(like.exit_code, 0);
   EXPECT_THAT(like.err, HasSubstr("bring it to that"));
   // The same map in other words joins.

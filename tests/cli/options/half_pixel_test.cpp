@@ -175,7 +175,7 @@ TEST_F(HalfPixel, RestoredSamplesLieWhereTheyLayInEveryFormat) {
     for (const Written& format : kFormats) {
       SCOPED_TRACE(kind + " " + format.extension);
       const std::string path = folder_ / ("back" + std::string(format.extension));
-      (void)run({"restore", folder_ / "a.isohf", path, "--overwrite", "-q", "-j", "1"});
+      (void)run({"export", folder_ / "a.isohf", path, "--overwrite", "-q", "-j", "1"});
       const Raster raster = read_raster(path);
       if (format.has_place) {
         expect_placed(raster, kOblong, format.only_area ? "area" : kind, 0.0);
@@ -218,7 +218,7 @@ TEST_F(HalfPixel, HgtTilesLieWhereTheirNameSays) {
     convert(folder_ / "tile.tif", "a.isohf", {"--lossless", "--projection", "equirectangular"});
     for (const std::string method : {"kept samples", "barycentric"}) {
       SCOPED_TRACE(to_string(registration) + " " + method);
-      std::vector<std::string> arguments = {"restore", folder_ / "a.isohf", tile, "--overwrite", "-q"};
+      std::vector<std::string> arguments = {"export", folder_ / "a.isohf", tile, "--overwrite", "-q"};
       if (method == "barycentric") arguments.insert(arguments.end(), {"--method", method});
       (void)run(arguments);
       // Whole numbers, of the surface as well: it is off by less than they are rounded by.
@@ -249,7 +249,7 @@ TEST_F(HalfPixel, HgtTilesAreNotWrittenUnderTheNameOfAnotherPlace) {
   convert(folder_ / "tile.tif", "a.isohf", {"--lossless", "--projection", "equirectangular"});
   const std::vector<std::string> before = folder_.names();
   for (const char* name : {"N44E006.hgt", "n10e021.hgt", "S10E020.hgt"}) {
-    const RunResult refused = run_isohf({"restore", folder_ / "a.isohf", folder_ / name, "-q"});
+    const RunResult refused = run_isohf({"export", folder_ / "a.isohf", folder_ / name, "-q"});
     EXPECT_EQ(refused.exit_code, 2) << name;
     EXPECT_THAT(refused.err, ::testing::HasSubstr(
                                  "these samples lie at 20 to 21 and 10 to 11; give the file the name of its place"));
@@ -273,7 +273,7 @@ TEST_F(HalfPixel, GdalFindsEverySampleWhereWeDo) {
       SCOPED_TRACE(to_string(registration) + " " + name);
       const Ramp& ramp = name == "N10E020.hgt" ? kTile : kOblong;
       const std::string archive = name == "N10E020.hgt" ? "tile.isohf" : "ramp.isohf";
-      (void)run({"restore", folder_ / archive, folder_ / name, "--overwrite", "-q"});
+      (void)run({"export", folder_ / archive, folder_ / name, "--overwrite", "-q"});
       const RunResult told = run_program({"/usr/bin/env", no_pam, "gdalinfo", "-json", folder_ / name});
       ASSERT_EQ(told.exit_code, 0) << told.err;
       // GDAL's place is the corner of the first area, whatever the samples stand for.

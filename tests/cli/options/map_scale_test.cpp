@@ -165,7 +165,7 @@ TEST_F(MapCommand, EveryKindPassesEveryCheck) {
 
 TEST_F(MapCommand, ProjectedSamplesComeBackBitForBit) {
   ASSERT_EQ(convert("web.tif", "a.isohf", {"--projection", "auto", "--lossless"}).exit_code, 0);
-  ASSERT_EQ(run_isohf({"restore", folder / "a.isohf", folder / "back.tif"}).exit_code, 0);
+  ASSERT_EQ(run_isohf({"export", folder / "a.isohf", folder / "back.tif"}).exit_code, 0);
   const auto back = open_raster(folder / "back.tif", {});
   const auto first = open_raster(folder / "web.tif", {});
   std::vector<std::byte> a(static_cast<std::size_t>(kSize * kSize) * 4);
@@ -223,7 +223,7 @@ TEST_F(MapCommand, FeetSurvive) {
   write(folder / "feet.tif", 2263, 1200.0 / 3937.0, {-73.9857, 40.7484});
   EXPECT_EQ(info("feet.tif").at("metres_per_unit").get<double>(), 1200.0 / 3937.0);
   ASSERT_EQ(convert("feet.tif", "a.isohf").exit_code, 0);
-  ASSERT_EQ(run_isohf({"restore", folder / "a.isohf", folder / "back.tif"}).exit_code, 0);
+  ASSERT_EQ(run_isohf({"export", folder / "a.isohf", folder / "back.tif"}).exit_code, 0);
   ASSERT_EQ(run_isohf({"shade", folder / "a.isohf", "-o", folder / "shade.tif"}).exit_code, 0);
   for (const char* name : {"feet.tif", "a.isohf", "back.tif"}) {
     EXPECT_NEAR(info(name).at("lonlat").at("centre").at("latitude").get<double>(), 40.7484, 0.001) << name;

@@ -112,13 +112,13 @@ TEST_F(ProjectionCommand, SampleReadsDegreesFromStandardInput) {
 
 TEST_F(ProjectionCommand, RestoreGivesARasterOfTheMap) {
   converts({"--projection", "utm:32N"});
-  const RunResult restored = isohf({"restore", folder / "a.isohf", folder / "a.tif"});
+  const RunResult restored = isohf({"export", folder / "a.isohf", folder / "a.tif"});
   ASSERT_EQ(restored.exit_code, 0) << restored.err;
   const auto utm = open_raster(folder / "a.tif", {});
   EXPECT_EQ(utm->info().georeference.unit, HorizontalUnit::kMetre);
   EXPECT_EQ(utm->info().georeference.registration, Registration::kArea);
   converts({"--projection", "lambert-conformal:44,48,8"});
-  const RunResult mapped = isohf({"restore", folder / "a.isohf", folder / "b.tif"});
+  const RunResult mapped = isohf({"export", folder / "a.isohf", folder / "b.tif"});
   ASSERT_EQ(mapped.exit_code, 0) << mapped.err;
   const auto cone = open_raster(folder / "b.tif", {});
   EXPECT_EQ(cone->info().georeference.unit, HorizontalUnit::kMetre);
@@ -135,7 +135,7 @@ TEST_F(ProjectionCommand, RestoreGivesARasterOfTheMap) {
   for (const char* kind :
        {"local", "transverse-mercator:9,0.9996", "lambert-conformal:-30,30,5", "polar-stereographic:50"}) {
     converts({"--projection", kind});
-    ASSERT_EQ(isohf({"restore", folder / "a.isohf", folder / (std::string(kind).substr(0, 5) + ".tif")}).exit_code, 0);
+    ASSERT_EQ(isohf({"export", folder / "a.isohf", folder / (std::string(kind).substr(0, 5) + ".tif")}).exit_code, 0);
   }
   for (const char* raster : {"a.tif", "b.tif", "local.tif", "trans.tif", "lambe.tif", "polar.tif"}) {
     const RunResult found = run_program(
@@ -179,7 +179,7 @@ TEST_F(ProjectionCommand, LosslessGivesTheInputBackThroughEveryKind) {
     EXPECT_TRUE(read_file(folder / "a.isohf") == one);
     EXPECT_LT(one.size(), 2 * plain.size());
     EXPECT_EQ(isohf({"verify", folder / "a.isohf"}).exit_code, 0);
-    const RunResult restored = isohf({"restore", folder / "a.isohf", folder / "back.flt", "--overwrite"});
+    const RunResult restored = isohf({"export", folder / "a.isohf", folder / "back.flt", "--overwrite"});
     ASSERT_EQ(restored.exit_code, 0) << restored.err;
     EXPECT_THAT(restored.out, HasSubstr("240 x 160 samples, the source's own samples"));
     EXPECT_TRUE(read_file(folder / "back.flt") == input);
@@ -190,7 +190,7 @@ TEST_F(ProjectionCommand, LosslessGivesTheInputBackThroughEveryKind) {
     EXPECT_NEAR(back->info().georeference.origin_y, 49.975, 1e-9);
     EXPECT_DOUBLE_EQ(back->info().georeference.spacing_x, 0.05);
     // What else is asked for is a raster of the map.
-    ASSERT_EQ(isohf({"restore", folder / "a.isohf", folder / "map.tif", "--overwrite", "--method", "hex"}).exit_code,
+    ASSERT_EQ(isohf({"export", folder / "a.isohf", folder / "map.tif", "--overwrite", "--method", "hex"}).exit_code,
               0);
     EXPECT_EQ(open_raster(folder / "map.tif", {})->info().georeference.unit, HorizontalUnit::kMetre);
   }
@@ -205,7 +205,7 @@ TEST_F(ProjectionCommand, LosslessKeepsVoidsAndGroundBeyondTheMap) {
   const RunResult made = isohf({"convert", folder / "cap.flt", folder / "a.isohf", "--lossless", "--fill"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   EXPECT_THAT(made.out, HasSubstr("polar-stereographic"));
-  ASSERT_EQ(isohf({"restore", folder / "a.isohf", folder / "back.flt"}).exit_code, 0);
+  ASSERT_EQ(isohf({"export", folder / "a.isohf", folder / "back.flt"}).exit_code, 0);
   EXPECT_TRUE(read_file(folder / "back.flt") == read_file(folder / "cap.flt"));
 }
 

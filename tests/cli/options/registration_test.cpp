@@ -137,7 +137,7 @@ class RegistrationOf : public testing::Test {
 
   /// Restored samples are the ramp's, and lie where the input's lay.
   void expect_restored(const std::string& input, const std::vector<std::string>& options) const {
-    const RunResult result = run_isohf({"restore", folder / "a.isohf", folder / "back.tif", "--overwrite", "-q"});
+    const RunResult result = run_isohf({"export", folder / "a.isohf", folder / "back.tif", "--overwrite", "-q"});
     ASSERT_EQ(result.exit_code, 0) << result.err;
     std::vector<std::string> arguments = {"info", input, "--json", "-q"};
     arguments.insert(arguments.end(), options.begin(), options.end());
@@ -224,7 +224,7 @@ TEST_F(RegistrationOf, SurvivesRestoringASourceWithoutGeoreference) {
     convert(folder / "r.exr", {"--registration", registration});
     for (const char* extension : {".tif", ".r32"}) {
       const std::string path = folder / ("back" + std::string(extension));
-      const RunResult result = run_isohf({"restore", folder / "a.isohf", path, "--overwrite", "-q"});
+      const RunResult result = run_isohf({"export", folder / "a.isohf", path, "--overwrite", "-q"});
       ASSERT_EQ(result.exit_code, 0) << result.err;
       const json found = info(path);
       EXPECT_EQ(found.at("registration"), registration) << path;

@@ -16,8 +16,8 @@ namespace {
 
 using testing::HasSubstr;
 
-const std::vector<std::string> kCommands = {"plan",   "convert", "info",  "verify", "restore",
-                                            "export", "sample",  "shade", "view",   "formats"};
+const std::vector<std::string> kCommands = {"plan",   "convert", "info", "verify", "export",
+                                            "sample", "shade",   "view", "formats"};
 
 std::set<std::string> long_options_in(const std::string& text) {
   std::set<std::string> found;

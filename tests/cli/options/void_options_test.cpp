@@ -144,7 +144,7 @@ TEST_F(VoidOptions, FillingReachesOverTheBordersOfAMosaic) {
 TEST_F(VoidOptions, LosslessKeepsTheFilesOwnSamples) {
   const json summary = convert({"--valid-range", "100:5000", "--fill", "--lossless"});
   EXPECT_EQ(summary.at("metadata").at("statistics").at("voids"), 0);
-  const RunResult restored = run_isohf({"restore", folder / "a.isohf", folder / "back.tif"});
+  const RunResult restored = run_isohf({"export", folder / "a.isohf", folder / "back.tif"});
   ASSERT_EQ(restored.exit_code, 0) << restored.err;
   const auto statistics = [&](const std::string& name) {
     return json::parse(run_isohf({"info", folder / name, "--stats", "--json", "-q"}).out).at("statistics");

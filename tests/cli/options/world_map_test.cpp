@@ -43,7 +43,7 @@ TEST(WorldMap, AGlobeIsShownOnceWhereverItsLongitudesBegin) {
       ASSERT_EQ(made.exit_code, 0) << made.err;
       const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--against", folder / "globe.flt"});
       EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
-      const RunResult restored = run_isohf({"restore", folder / "a.isohf", folder / "a.tif", "--overwrite", "-q"});
+      const RunResult restored = run_isohf({"export", folder / "a.isohf", folder / "a.tif", "--overwrite", "-q"});
       ASSERT_EQ(restored.exit_code, 0) << restored.err;
       const Raster raster = read_raster(folder / "a.tif");
       EXPECT_NEAR(static_cast<double>(raster.info.width) / static_cast<double>(raster.info.height), 2.0, 0.1);
@@ -77,7 +77,7 @@ TEST(WorldMap, ItsOwnDegreesGiveAllColumnsAndTheBoxThatIsAsked) {
         run_isohf({"convert", folder / "cap.flt", folder / "a.isohf", "--overwrite", "--type", "f32"});
     ASSERT_EQ(made.exit_code, 0) << made.err;
     const RunResult restored =
-        run_isohf({"restore", folder / "a.isohf", folder / "a.tif", "--crs", "EPSG:4326", "--overwrite", "-q"});
+        run_isohf({"export", folder / "a.isohf", folder / "a.tif", "--crs", "EPSG:4326", "--overwrite", "-q"});
     ASSERT_EQ(restored.exit_code, 0) << restored.err;
     const Raster whole = read_raster(folder / "a.tif");
     EXPECT_EQ(whole.info.width, 360);
@@ -133,7 +133,7 @@ TEST(Parts, SamplesOnTheirEdgeBelongToTheEasternAndTheSouthernOne) {
     ASSERT_EQ(
         run_isohf({"extract", folder / "a.isohf", "-o", folder / "p.isohf", "--tiles", tiles, "--overwrite"}).exit_code,
         0);
-    const RunResult restored = run_isohf({"restore", folder / "p.isohf", folder / "p.tif", "--overwrite"});
+    const RunResult restored = run_isohf({"export", folder / "p.isohf", folder / "p.tif", "--overwrite"});
     ASSERT_EQ(restored.exit_code, 0) << restored.err;
     const Raster part = read_raster(folder / "p.tif");
     samples += part.info.width * part.info.height;

@@ -145,11 +145,11 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(0, "verify", {"verify", "--list-checks"});
   documents.run(1, "error", {"verify", folder / "none.isohf"});
 
-  documents.run(0, "restore", {"restore", a, folder / "a.tif"});
-  documents.run(0, "restore", {"restore", b, folder / "b.npy", "--size", "50x50", "--progress", "json"});
-  documents.run(0, "restore", {"restore", d, folder / "d.tif", "--like", degrees});
-  documents.run(2, "error", {"restore", a, folder / "a.tif"});
-  documents.run(0, "export", {"export", a, folder / "t.r16", "--tiles", "2x2", "--progress", "json"});
+  documents.run(0, "export", {"export", a, folder / "a.tif"});
+  documents.run(0, "export", {"export", b, folder / "b.npy", "--size", "50x50", "--progress", "json"});
+  documents.run(0, "export", {"export", d, folder / "d.tif", "--like", degrees});
+  documents.run(2, "error", {"export", a, folder / "a.tif"});
+  documents.run(0, "export", {"export", a, folder / "t.r16", "--size", "40x40", "--tile-size", "20", "--progress", "json"});
   documents.run(0, "export", {"export", a, folder / "t.asc", "--size", "30x20"});
   documents.run(2, "error", {"export", a, folder / "t.xyz"});
 

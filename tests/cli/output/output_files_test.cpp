@@ -71,7 +71,7 @@ TEST_F(OutputFiles, ARasterReplacesNothingElse) {
   write_file(folder / "notes.png", "my notes");
   write_file(folder / "sky.hdr", "#?RADIANCE\n");
   std::filesystem::copy_file(folder / "a.isohf", folder / "c.tif");
-  for (const std::string command : {"restore", "export", "shade"}) {
+  for (const std::string command : {"export", "shade"}) {
     expect_refused({command, "a.isohf", "notes.png", "--overwrite"}, "notes.png: exists and is no PNG");
     expect_refused({command, "a.isohf", "c.tif", "--overwrite"}, "c.tif: exists and is a ZIP archive");
   }
@@ -80,15 +80,15 @@ TEST_F(OutputFiles, ARasterReplacesNothingElse) {
 }
 
 TEST_F(OutputFiles, ARasterIsNeverItsInput) {
-  expect_refused({"restore", "a.isohf", "b.tif", "--like", "b.tif", "--overwrite"}, "is one of the inputs");
+  expect_refused({"export", "a.isohf", "b.tif", "--like", "b.tif", "--overwrite"}, "is one of the inputs");
   run({"export", "a.isohf", "grid.flt", "-q"});
-  expect_refused({"restore", "a.isohf", "grid.flt", "--like", "grid.hdr", "--overwrite"},
+  expect_refused({"export", "a.isohf", "grid.flt", "--like", "grid.hdr", "--overwrite"},
                  "writes grid.hdr, which is one of the inputs");
 }
 
 TEST_F(OutputFiles, ADashIsRefusedBeforeTheWork) {
   expect_refused({"convert", "a.tif", "-o", "-"}, "-: standard output is not written to");
-  for (const std::string command : {"restore", "export", "shade"}) {
+  for (const std::string command : {"export", "shade"}) {
     expect_refused({command, "a.isohf", "-o", "-"}, "-: standard output is not written to");
   }
   EXPECT_THAT(run({"convert", "a.tif", "c.isohf", "--report", "-"}).out, HasSubstr("rms"));
@@ -106,7 +106,7 @@ TEST_F(OutputFiles, AReportReplacesOnlyReports) {
 TEST_F(OutputFiles, LinksAreWrittenThrough) {
   std::filesystem::create_directory(folder / "disk");
   const std::vector<std::pair<std::string, std::vector<std::string>>> outputs = {{"x.isohf", {"convert", "a.tif"}},
-                                                                                 {"x.tif", {"restore", "a.isohf"}},
+                                                                                 {"x.tif", {"export", "a.isohf"}},
                                                                                  {"x.r16", {"export", "a.isohf"}},
                                                                                  {"x.png", {"shade", "a.isohf"}}};
   for (const auto& [name, command] : outputs) {
@@ -148,30 +148,29 @@ TEST_F(OutputFiles, OverwritingKeepsPermissions) {
 }
 
 TEST_F(OutputFiles, ProgressNeverGoesIntoTheOutput) {
-  run({"restore", "a.isohf", "good.tif", "-q"});
+  run({"export", "a.isohf", "good.tif", "-q"});
   RunOptions options;
   options.folder = folder.path();
   const RunResult result = run_program(
-      {"/bin/sh", "-c", "exec \"$0\" restore a.isohf closed.tif --progress plain <&- 2>&-", isohf_path()}, options);
+      {"/bin/sh", "-c", "exec \"$0\" export a.isohf closed.tif --progress plain <&- 2>&-", isohf_path()}, options);
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(read_file(folder / "closed.tif"), read_file(folder / "good.tif"));
 }
 
 TEST_F(OutputFiles, UsageErrorsOfEveryWriterExitWithTwo) {
-  for (const std::string command : {"restore", "export", "shade"}) {
+  for (const std::string command : {"export", "shade"}) {
     expect_refused({command, "a.isohf", "x.gif"}, "x.gif: no writer for the extension \".gif\"");
     expect_refused({command, "a.isohf", "x"}, "no writer for the extension");
   }
   expect_refused({"export", "a.isohf", "x.png", "--type", "f32"}, "PNG stores uint8 and uint16, not float32");
   expect_refused({"export", "a.isohf", "x.hgt"}, "an HGT tile has");
-  expect_refused({"restore", "a.isohf", "x.hgt"}, "an HGT tile has");
 }
 
 TEST_F(OutputFiles, AFullDiskIsToldWithTheFileAndTheCause) {
   RunOptions options;
   options.folder = folder.path();
   options.file_size_limit_bytes = 4000;
-  const RunResult full = run_isohf({"restore", "a.isohf", "x.tif"}, options);
+  const RunResult full = run_isohf({"export", "a.isohf", "x.tif"}, options);
   EXPECT_EQ(full.exit_code, 1);
   EXPECT_THAT(full.err, HasSubstr("isohf: x.tif: cannot write"));
   EXPECT_THAT(full.err, HasSubstr("File too large"));

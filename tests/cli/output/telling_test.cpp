@@ -168,10 +168,10 @@ TEST(JsonFiles, AreAllThatRestoreExportAndShadeWrote) {
     EXPECT_EQ(told.size(), count);
     EXPECT_EQ(std::set<std::string>(told.begin(), told.end()), there);
   };
-  expect_all({"restore"}, "a.tif", 1);
-  expect_all({"restore", "--size", "20x20"}, "a.flt", 2);
+  expect_all({"export"}, "a.tif", 1);
+  expect_all({"export", "--size", "20x20"}, "a.flt", 2);
   expect_all({"export"}, "a.r16", 2);
-  expect_all({"export", "--tiles", "2x2"}, "a.r16", 8);
+  expect_all({"export", "--size", "40x40", "--tile-size", "20"}, "a.r16", 8);
   expect_all({"shade"}, "a.png", 3);  // with a world file and .aux.xml
 }
 

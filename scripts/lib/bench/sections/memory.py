@@ -10,12 +10,12 @@ KINDS = {"bilinear": ["--filter", "bilinear"], "bspline3": ["--filter", "bspline
          "--fill": ["--filter", "bilinear", "--nodata", "900", "--fill"],
          "--no-planes": ["--filter", "bilinear", "--no-planes"]}
 # What is read: the archive of a kind above, and how; OUT is written, or nothing.
-READERS = {"restore": ("bilinear", ["restore", "IN", "OUT.npy"]),
-           "restore to a GeoTIFF": ("bilinear", ["restore", "IN", "OUT.tif"]),
-           "restore, --lossless": ("--lossless", ["restore", "IN", "OUT.npy"]),
+READERS = {"export": ("bilinear", ["export", "IN", "OUT.npy"]),
+           "export to a GeoTIFF": ("bilinear", ["export", "IN", "OUT.tif"]),
+           "export, --lossless": ("--lossless", ["export", "IN", "OUT.npy"]),
            "export --method barycentric": ("bilinear", ["export", "IN", "OUT.npy", "--method", "barycentric"]),
-           "export to .r16": ("bilinear", ["export", "IN", "OUT.r16"]),
-           "export --tiles 8x1": ("bilinear", ["export", "IN", "OUT.r32", "--tiles", "8x1"]),
+           "export to .r16": ("bilinear", ["export", "IN", "OUT.r16", "--method", "hex"]),
+           "export in 8 tiles": ("bilinear", ["export", "IN", "OUT.r32", "--tile-size", "TILE"]),
            "diff": ("bilinear", ["diff", "IN", "seeds"]),
            "diff --surface": ("bilinear", ["diff", "IN", "bspline3", "--surface"]),
            "diff --raster": ("bilinear", ["diff", "IN", "bspline3", "--raster", "OUT.npy"]),
@@ -81,7 +81,9 @@ def measure_size(bench, size, limit, found, rows):
     source = bench.terrain(size)
     archives = {kind: bench.work / f"memory_{i}.isohf" for i, kind in enumerate(KINDS)}
     output = bench.work / "memory_out"
-    words = {"SOURCE": source, "FULL": size, "seeds": archives["with seeds"], "bspline3": archives["bspline3"]}
+    width, height = (int(side) for side in size.split("x"))
+    words = {"SOURCE": source, "FULL": size, "TILE": f"{width // 8}x{height}", "seeds": archives["with seeds"],
+             "bspline3": archives["bspline3"]}
     commands = {f"convert, {kind}": (["convert", source, "-o", archives[kind], *options, "--overwrite", "--quiet"],
                                      archives[kind], None) for kind, options in KINDS.items()}
     for name, (kind, command) in READERS.items():

@@ -1,4 +1,4 @@
-/// isohf restore --like: grids of other rasters, through projections and beside them.
+/// isohf export --like: grids of other rasters, through projections and beside them.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -51,9 +51,9 @@ Raster read_raster(const std::string& path) {
   return raster;
 }
 
-class RestoreLike : public testing::Test {
+class ExportLike : public testing::Test {
  protected:
-  RestoreLike() { write_degrees(folder / "wide", 240, 160, 2.0, 42.0, 0.05, land); }
+  ExportLike() { write_degrees(folder / "wide", 240, 160, 2.0, 42.0, 0.05, land); }
 
   void convert(const std::string& name, const std::string& kind, const std::vector<std::string>& more = {}) const {
     std::vector<std::string> arguments = {
@@ -64,12 +64,12 @@ class RestoreLike : public testing::Test {
   }
 
   [[nodiscard]] RunResult run(const std::string& output, const std::vector<std::string>& more) const {
-    std::vector<std::string> arguments = {"restore", folder / "a.isohf", folder / output};
+    std::vector<std::string> arguments = {"export", folder / "a.isohf", folder / output};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_isohf(arguments);
   }
 
-  /// Restores onto the grid of a raster of the folder.
+  /// Exports onto the grid of a raster of the folder.
   [[nodiscard]] Raster like(const std::string& name, const std::string& output = "like.tif",
                             std::vector<std::string> more = {}) const {
     more.insert(more.end(), {"--like", folder / name, "--overwrite", "-q"});
@@ -116,7 +116,7 @@ class RestoreLike : public testing::Test {
 };
 
 /// What verify measures on the triangles at the source's samples is what comes back there.
-TEST_F(RestoreLike, ErrsAtTheSourcesSamplesByWhatVerifyMeasures) {
+TEST_F(ExportLike, ErrsAtTheSourcesSamplesByWhatVerifyMeasures) {
   const Raster source = read_raster(folder / "wide.flt");
   for (const std::string& kind : kWarpedKinds) {
     SCOPED_TRACE(kind);
@@ -147,7 +147,7 @@ TEST_F(RestoreLike, ErrsAtTheSourcesSamplesByWhatVerifyMeasures) {
   }
 }
 
-TEST_F(RestoreLike, GivesWhatSampleFindsAtFinerCoarserAndShiftedGrids) {
+TEST_F(ExportLike, GivesWhatSampleFindsAtFinerCoarserAndShiftedGrids) {
   // With a hole, and ground on all sides that the archive does not have; the last one is counted on from 361.
   const auto holed = [](double longitude, double latitude) {
     return std::hypot(longitude - 8.0, latitude - 46.0) < 0.6 ? -9999.0 : land(longitude, latitude);
@@ -186,27 +186,27 @@ TEST_F(RestoreLike, GivesWhatSampleFindsAtFinerCoarserAndShiftedGrids) {
   }
 }
 
-TEST_F(RestoreLike, BytesDoNotDependOnThreads) {
+TEST_F(ExportLike, BytesDoNotDependOnThreads) {
   convert("wide.flt", "lambert-conformal");
   (void)like("wide.flt", "one.tif", {"-j", "1"});
   (void)like("wide.flt", "five.tif", {"-j", "5"});
   EXPECT_TRUE(read_file(folder / "one.tif") == read_file(folder / "five.tif"));
 }
 
-TEST_F(RestoreLike, SaysInWordsAndJsonWhereTheSamplesLie) {
+TEST_F(ExportLike, SaysInWordsAndJsonWhereTheSamplesLie) {
   convert("wide.flt", "utm");
   EXPECT_EQ(run("said.tif", {"--like", folder / "wide.flt"}).out,
-            folder / "said.tif" + ": 240 x 160 samples, method barycentric, 0 voids\n");
+            folder / "said.tif" + ": 240 x 160 samples of float32, 0.05 x 0.05 apart\n");
   const json said = json::parse(run("json.tif", {"--like", folder / "wide.flt", "--json"}).out);
   EXPECT_EQ(said.at("method"), "barycentric");
   EXPECT_EQ(said.at("width"), 240);
-  EXPECT_DOUBLE_EQ(said.at("first_sample").at("longitude"), 2.025);
-  EXPECT_DOUBLE_EQ(said.at("first_sample").at("latitude"), 49.975);
-  EXPECT_DOUBLE_EQ(said.at("spacing").at("longitude"), 0.05);
-  EXPECT_DOUBLE_EQ(said.at("spacing").at("latitude"), 0.05);
+  EXPECT_DOUBLE_EQ(said.at("first_sample").at("x"), 2.025);
+  EXPECT_DOUBLE_EQ(said.at("first_sample").at("z"), 49.975);
+  EXPECT_DOUBLE_EQ(said.at("spacing").at("x"), 0.05);
+  EXPECT_DOUBLE_EQ(said.at("spacing").at("z"), 0.05);
 }
 
-TEST_F(RestoreLike, HasNothingBeyondAPole) {
+TEST_F(ExportLike, HasNothingBeyondAPole) {
   write_degrees(folder / "cap", 360, 40, -180.0, 50.0, 1.0,
                 [](double, double latitude) { return 50.0 * (90.0 - latitude); });
   convert("cap.flt", "auto");
@@ -224,7 +224,7 @@ TEST_F(RestoreLike, HasNothingBeyondAPole) {
 }
 
 /// A raster of the map is one of the archive's own grids, whichever format it went through.
-TEST_F(RestoreLike, TakesRastersOfTheArchivesOwnMap) {
+TEST_F(ExportLike, TakesRastersOfTheArchivesOwnMap) {
   for (const std::string& kind : kWarpedKinds) {
     convert("wide.flt", kind);
     for (const std::string extension : {".tif", ".png", ".flt", ".r32"}) {
@@ -247,7 +247,7 @@ TEST_F(RestoreLike, TakesRastersOfTheArchivesOwnMap) {
   }
 }
 
-TEST_F(RestoreLike, RefusesWhatHasNoPlaceOnTheMap) {
+TEST_F(ExportLike, RefusesWhatHasNoPlaceOnTheMap) {
   convert("wide.flt", "utm:32N");
   ASSERT_EQ(run("utm.tif", {"-q"}).exit_code, 0);
   convert("wide.flt", "lambert-conformal");
@@ -273,7 +273,7 @@ TEST_F(RestoreLike, RefusesWhatHasNoPlaceOnTheMap) {
   refuses("old.flt", "is in \"NAD27\" with an equatorial radius of 6378206.4 m, the archive's source in \"WGS 84\"");
 }
 
-TEST_F(RestoreLike, NeverTakesDegreesForMetresBesideAMap) {
+TEST_F(ExportLike, NeverTakesDegreesForMetresBesideAMap) {
   const std::string coast = ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif";
   ASSERT_EQ(run_isohf({"convert", coast, folder / "a.isohf"}).exit_code, 0);
   refuses("wide.flt", "is in degrees, the archive's source in metres");
@@ -283,7 +283,7 @@ TEST_F(RestoreLike, NeverTakesDegreesForMetresBesideAMap) {
           "is in metres, the archive's source in degrees; bring it to the source's reference system, \"WGS");
 }
 
-TEST_F(RestoreLike, CountsLongitudesRoundTheBodyWhereRowsStayRows) {
+TEST_F(ExportLike, CountsLongitudesRoundTheBodyWhereRowsStayRows) {
   convert("wide.flt", "equirectangular");
   write_degrees(folder / "turned", 60, 50, 363.0, 43.0, 0.11, land);
   write_degrees(folder / "plain", 60, 50, 3.0, 43.0, 0.11, land);
@@ -297,7 +297,7 @@ double hills(double longitude, double latitude) {
   return 800.0 + 400.0 * std::sin(longitude * M_PI / 60.0) * std::cos(latitude * M_PI / 60.0);
 }
 
-TEST_F(RestoreLike, FindsAllColumnsOfAGlobeThatCountsFromTheOtherSide) {
+TEST_F(ExportLike, FindsAllColumnsOfAGlobeThatCountsFromTheOtherSide) {
   write_degrees(folder / "from_0", 144, 72, 0.0, -90.0, 2.5, hills);
   write_degrees(folder / "around_0", 144, 72, -180.0, -90.0, 2.5, hills);
   write_degrees(folder / "box", 24, 16, -30.0, -20.0, 2.5, hills);
@@ -317,7 +317,7 @@ TEST_F(RestoreLike, FindsAllColumnsOfAGlobeThatCountsFromTheOtherSide) {
   }
 }
 
-TEST_F(RestoreLike, CrsOfTheArchiveItselfGivesTheSourcesGrid) {
+TEST_F(ExportLike, CrsOfTheArchiveItselfGivesTheSourcesGrid) {
   for (const std::string& kind : {std::string("equirectangular"), std::string("lambert-conformal")}) {
     SCOPED_TRACE(kind);
     convert("wide.flt", kind);
@@ -333,7 +333,7 @@ TEST_F(RestoreLike, CrsOfTheArchiveItselfGivesTheSourcesGrid) {
   }
 }
 
-TEST_F(RestoreLike, CrsTakesGroundAcrossThe180thMeridianAndWholeGlobes) {
+TEST_F(ExportLike, CrsTakesGroundAcrossThe180thMeridianAndWholeGlobes) {
   write_degrees(folder / "fiji", 40, 30, 170.0, -20.0, 0.5, hills);
   write_degrees(folder / "globe", 144, 72, 0.0, -90.0, 2.5, hills);
   convert("fiji.flt", "lambert-conformal");
@@ -389,7 +389,7 @@ TEST_F(RestoreLike, CrsTakesGroundAcrossThe180thMeridianAndWholeGlobes) {
               0.05);
 }
 
-TEST_F(RestoreLike, SaysByWhatSystemsDiffer) {
+TEST_F(ExportLike, SaysByWhatSystemsDiffer) {
   write_degrees(folder / "mars", 40, 30, 5.0, 40.0, 0.1, land);
   write_degrees(folder / "round", 40, 30, 5.0, 40.0, 0.1, land);
   const auto prj = [&](const std::string& name, const std::string& radius) {
