@@ -44,7 +44,7 @@ std::optional<ExtractCommand> parse_extract(const Arguments& arguments) {
   ExtractCommand options;
   CommandLine line("extract", "Cuts an archive: some of its tiles become an archive of their own.");
   line.group("Arguments");
-  line.positional("ARCHIVE", "-i,--input", "Archive to cut", options.archive);
+  line.positional("ARCHIVE", "Archive to cut", options.archive);
   line.option("-o,--output", "OUTPUT", "Archive to write", options.output);
   line.flag("--overwrite", "Replace OUTPUT where it exists", options.overwrite);
   line.option("--bbox", "W,S,E,N", "All tiles that touch this rectangle, in the units of the source's reference system",

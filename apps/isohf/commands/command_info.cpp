@@ -65,7 +65,6 @@ std::optional<InfoOptions> parse_info(const Arguments& arguments) {
   line.positionals("INPUT...",
                    "Archives and rasters to describe, one after the other: files, folders, \"patterns*\" and @lists",
                    options.inputs);
-  line.repeated("-i,--input", "INPUT", "An input; may be given again", options.inputs);
   line.flag("--recursive", "Look into the folders of a folder as well", options.recursive);
   line.flag("--tiles", "List an archive's tiles", options.tiles);
   line.flag("--stats", "Read all samples of a raster: range, mean, voids", options.stats);

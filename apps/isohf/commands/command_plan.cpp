@@ -53,13 +53,10 @@ std::optional<PlanOptions> parse_plan(const Arguments& arguments) {
   PlanOptions options;
   CommandLine line("plan", "Lists tile shapes, or previews a conversion.");
   line.group("Arguments");
-  std::vector<std::string> names;
   line.positionals("[INPUT...]",
                    "Rasters of elevations: files, folders, \"patterns*\" and @lists, which form one source (default: "
                    "none, list shapes)",
-                   names);
-  line.repeated("-i,--input", "INPUT", "An input, before those without a name; may be given again",
-                options.inputs.names);
+                   options.inputs.names);
   add_shape_options(line, options.request);
   line.group("Candidates");
   add_code_type_option(line, options.code_type);
@@ -74,7 +71,6 @@ std::optional<PlanOptions> parse_plan(const Arguments& arguments) {
   add_common_options(line, options.common);
   line.footer(kPlanFooter);
   if (!line.parse(arguments)) return std::nullopt;
-  options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, "plan: " + why); };
   if (options.inputs.names.empty()) {
     const std::string option = line.first_given({"Lattice", "Ground", "Input", "Several inputs"});

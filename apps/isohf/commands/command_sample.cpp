@@ -84,7 +84,7 @@ std::optional<SampleOptions> parse_sample(const Arguments& arguments) {
   SampleOptions options;
   CommandLine line("sample", "Prints elevation and normal at places read from standard input.");
   line.group("Arguments");
-  line.positional("ARCHIVE", "-i,--input", "Archive to sample", options.archive);
+  line.positional("ARCHIVE", "Archive to sample", options.archive);
   line.repeated_pair("--at", "X Z", "A place, instead of standard input; may be given again",
                      [&](const std::string& x, const std::string& z) {
                        options.places.push_back({parse_number(x), parse_number(z)});

@@ -86,7 +86,7 @@ std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
   ShadeOptions& request = options.picture;
   CommandLine line("shade", "Draws a picture of an archive's surface with the shadows that it casts.");
   line.group("Arguments");
-  line.positional("ARCHIVE", "-i,--input", "Archive to draw", options.archive);
+  line.positional("ARCHIVE", "Archive to draw", options.archive);
   line.positional("OUTPUT", "-o,--output", "Picture to write: .png, .tif or .exr", options.output);
   line.flag("--overwrite", "Replace OUTPUT where it exists", options.overwrite);
   line.flag("--uncompressed", "TIFF, EXR: no compression", options.uncompressed);

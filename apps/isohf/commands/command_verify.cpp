@@ -65,7 +65,6 @@ std::optional<VerifyCommandOptions> parse_verify(const Arguments& arguments, con
   line.positionals("ARCHIVE...",
                    "Archives to check, one after the other: files, folders of .isohf, \"patterns*\" and @lists",
                    options.archives);
-  line.repeated("-i,--input", "ARCHIVE", "An archive; may be given again", options.archives);
   line.flag("--list-checks", "Print what is checked, one finding kind a line, and exit", options.list_checks);
   line.group("Comparison");
   line.repeated(

@@ -66,20 +66,18 @@ bool is_archive_name(const std::string& name) {
 
 /// The last name is the output where -o names none and it is called .isohf. Any other name is an input: a forgotten
 /// output must not cost the last of them.
-void take_output(std::vector<std::string> names, ConvertCommandOptions& options) {
-  std::vector<std::string>& inputs = options.inputs.names;
-  if (options.output.empty() && !names.empty() && inputs.size() + names.size() > 1) {
-    if (is_archive_name(names.back())) {
-      options.output = names.back();
-      names.pop_back();
-    } else if (!options.dry_run) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("convert: no OUTPUT given: {0} is not called .isohf and counts as an input; name the "
-                              "archive NAME.isohf, or give -o {0} if that is meant",
-                              names.back()));
-    }
+void take_output(ConvertCommandOptions& options) {
+  std::vector<std::string>& names = options.inputs.names;
+  if (!options.output.empty() || names.size() < 2) return;
+  if (is_archive_name(names.back())) {
+    options.output = names.back();
+    names.pop_back();
+  } else if (!options.dry_run) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("convert: no OUTPUT given: {0} is not called .isohf and counts as an input; name the "
+                            "archive NAME.isohf, or give -o {0} if that is meant",
+                            names.back()));
   }
-  inputs.insert(inputs.end(), names.begin(), names.end());
 }
 
 /// What belongs to --each alone, and what has no meaning for many archives.
@@ -133,15 +131,12 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
   ConvertCommandOptions options;
   bool no_planes = false;
   std::optional<double> sun_min_deg;
-  std::vector<std::string> names;
   CommandLine line("convert", "Turns rasters of elevations into an archive of isometric heightfield tiles.");
   line.group("Arguments");
   line.positionals("INPUT... OUTPUT",
                    "Rasters of elevations: files, folders, \"patterns*\" and @lists, which form one source; then the "
                    "archive to write, NAME.isohf",
-                   names);
-  line.repeated("-i,--input", "INPUT", "An input, before those without a name; may be given again",
-                options.inputs.names);
+                   options.inputs.names);
   line.option("-o,--output", "OUTPUT", "The archive to write; then all others are inputs", options.output);
   line.flag("--overwrite", "Replace OUTPUT where it exists", options.convert.overwrite);
   line.flag("--resume", "Continue OUTPUT.part of an interrupted run, after checking what is there",
@@ -205,11 +200,7 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
   if (!line.parse(arguments)) return std::nullopt;
   check_each_options(line, options);
   if (options.shard) check_shard_options(line, options);
-  if (options.each.each) {
-    options.inputs.names.insert(options.inputs.names.end(), names.begin(), names.end());
-  } else {
-    take_output(std::move(names), options);
-  }
+  if (!options.each.each) take_output(options);
   line.require("INPUT", options.inputs.names);
   if (!options.dry_run && !options.each.each) line.require("OUTPUT", options.output);
   if (options.convert.clamp_range && !options.convert.z_range) {

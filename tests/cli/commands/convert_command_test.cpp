@@ -49,7 +49,7 @@ TEST_F(ConvertCommand, SummaryCountsTilesAndNothingElseIsLeft) {
 }
 
 TEST_F(ConvertCommand, JsonIsOneDocumentAndAgreesWithTheArchive) {
-  const RunResult result = run_isohf({"convert", "-i", folder / "a.tif", "-o", folder / "a.isohf", "--json"});
+  const RunResult result = run_isohf({"convert", folder / "a.tif", "-o", folder / "a.isohf", "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.err, "");
   const json summary = json::parse(result.out);

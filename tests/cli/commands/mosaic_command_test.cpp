@@ -203,8 +203,6 @@ TEST_F(MosaicCommand, InputsAreFilesFoldersPatternsAndLists) {
   EXPECT_EQ(metadata().at("source").at("width"), 100);
   EXPECT_TRUE(all == convert({tiles + "*.tif", deep + "last.tif"}, options));
   EXPECT_TRUE(all == convert({"@" + (folder / "list.txt")}, options));
-  EXPECT_TRUE(all ==
-              convert({"-i", tiles + "piece1.tif", "-i", tiles + "piece0.tif", deep, tiles + "piece2.tif"}, options));
   const RunResult plan = run_isohf({"plan", tiles, deep});
   EXPECT_EQ(plan.exit_code, 0) << plan.err;
   EXPECT_THAT(plan.out, HasSubstr("mosaic of 4 files: GeoTIFF, 100 x 100 int16"));

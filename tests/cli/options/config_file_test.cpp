@@ -77,7 +77,6 @@ TEST_F(ConfigFile, ArraysServeListsPairsAndOptionsThatRepeat) {
   EXPECT_EQ(out_of("at = [1000, 2000]\n", {"sample", archive}),
             run_isohf({"sample", archive, "--at", "1000", "2000"}).out);
   EXPECT_EQ(run("[verify]\nagainst = ['" + coast_ + "']\nmax-rms = 1e9\n", {"verify", archive}).exit_code, 0);
-  EXPECT_EQ(out_of("input = ['" + coast_ + "']\n", {"plan"}), run_isohf({"plan", coast_}).out);
 }
 
 TEST_F(ConfigFile, BooleansServeFlagsAndOptionsThatMayStandAlone) {
