@@ -1,6 +1,9 @@
 #include "options/options_common.h"
 
+#include <cstdlib>
+
 #include "interrupt.h"
+#include "isohf/base/file.h"
 #include "options/option_values.h"
 #include "output/standard_output.h"
 
@@ -36,12 +39,15 @@ void add_work_options(CommandLine& line, WorkOptions& options) {
               });
 }
 
-void add_memory_options(CommandLine& line, const std::string& usual_folder, WorkOptions& options) {
+void add_memory_option(CommandLine& line, WorkOptions& options) {
   line.option("--memory", "SIZE",
               "Stay within SIZE of memory, to a tenth (default: as is fastest); as in 400M or 1.5GiB",
               [&](const std::string& text) { options.memory_bytes = parse_bytes(text); });
-  line.option("--tmpdir", "FOLDER", "Put the scratch file that --memory may need there (default: " + usual_folder + ")",
-              options.scratch_folder);
+}
+
+std::string scratch_folder_for(const std::string& output) {
+  const char* const folder = std::getenv("TMPDIR");
+  return folder != nullptr && *folder != '\0' ? folder : folder_of(output);
 }
 
 ScratchFolder scratch_of(const WorkOptions& options) {

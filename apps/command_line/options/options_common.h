@@ -24,15 +24,18 @@ void add_common_options(CommandLine& line, CommonOptions& options);
 struct WorkOptions {
   int threads = 0;                 ///< 0: all cores
   std::uint64_t memory_bytes = 0;  ///< 0: no bound
-  std::string scratch_folder;      ///< empty: not said
+  std::string scratch_folder;
   ProgressMode progress = ProgressMode::kAuto;
 };
 
 /// -j, --progress.
 void add_work_options(CommandLine& line, WorkOptions& options);
 
-/// --memory SIZE, --tmpdir FOLDER; usual_folder is described.
-void add_memory_options(CommandLine& line, const std::string& usual_folder, WorkOptions& options);
+/// --memory SIZE.
+void add_memory_option(CommandLine& line, WorkOptions& options);
+
+/// The folder for the scratch file that --memory may need: TMPDIR, or the output's folder if that is not set.
+[[nodiscard]] std::string scratch_folder_for(const std::string& output);
 
 /// Where files that are written keep what memory has no room for: nowhere where it is not bounded.
 [[nodiscard]] ScratchFolder scratch_of(const WorkOptions& options);

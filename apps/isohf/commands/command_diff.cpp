@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "commands/command.h"
-#include "isohf/base/file.h"
 #include "isohf/parts.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
@@ -54,12 +53,12 @@ std::optional<DiffCommand> parse_diff(const Arguments& arguments) {
               "Write SECOND minus FIRST at the places of FIRST's source samples (.tif, .exr, ...)", options.raster);
   line.flag("--overwrite", "Replace RASTER where it exists", options.overwrite);
   add_work_options(line, options.work);
-  add_memory_options(line, "RASTER's folder", options.work);
+  add_memory_option(line, options.work);
   add_common_options(line, options.common);
   line.footer(kDiffFooter);
   if (!line.parse(arguments)) return std::nullopt;
   if (options.archives.size() != 2) line.fail(fmt::format("found {} archives, must be two", options.archives.size()));
-  if (options.work.scratch_folder.empty()) options.work.scratch_folder = folder_of(options.raster);
+  options.work.scratch_folder = scratch_folder_for(options.raster);
   return options;
 }
 

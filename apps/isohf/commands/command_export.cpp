@@ -13,7 +13,6 @@
 #include "formats/decorate/cropped_source.h"
 #include "formats/files/text.h"
 #include "formats/georeference/reference_system.h"
-#include "isohf/base/file.h"
 #include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
 #include "isohf/projection/projection_wkt.h"
@@ -153,7 +152,7 @@ std::optional<ExportOptions> parse_export(const Arguments& arguments) {
   line.flag("--clamp-range", "Move samples that the type does not hold to its ends, instead of refusing",
             options.clamp_range);
   add_work_options(line, options.work);
-  add_memory_options(line, "OUTPUT's folder", options.work);
+  add_memory_option(line, options.work);
   add_common_options(line, options.common);
   line.footer(kExportFooter);
   for (const char* option : {"--size", "--spacing", "--crs", "--bbox", "--tile-size"}) {
@@ -167,7 +166,7 @@ std::optional<ExportOptions> parse_export(const Arguments& arguments) {
     throw Error(ErrorCode::kInvalidArgument,
                 options.output + ": OUTPUT has an archive's name; ARCHIVE comes first, OUTPUT last");
   }
-  if (options.work.scratch_folder.empty()) options.work.scratch_folder = folder_of(options.output);
+  options.work.scratch_folder = scratch_folder_for(options.output);
   if (options.overlap > 0 && !options.tile_size) {
     throw Error(ErrorCode::kInvalidArgument, "export: --overlap needs --tile-size");
   }

@@ -13,7 +13,6 @@
 #include "formats/files/text.h"
 #include "formats/georeference/units.h"
 #include "formats/write/raster_sink.h"
-#include "isohf/base/file.h"
 #include "isohf/error.h"
 #include "isohf/shade.h"
 #include "isohf/surface.h"
@@ -145,13 +144,13 @@ std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
   line.option("--palette", "NAME", "Colours of the ground: elevation, gray, mars (default: its body's)",
               [&](const std::string& text) { request.palette = parse_palette(text); });
   add_work_options(line, options.work);
-  add_memory_options(line, "OUTPUT's folder", options.work);
+  add_memory_option(line, options.work);
   add_common_options(line, options.common);
   line.footer(kShadeFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
   line.require("OUTPUT", options.output);
-  if (options.work.scratch_folder.empty()) options.work.scratch_folder = folder_of(options.output);
+  options.work.scratch_folder = scratch_folder_for(options.output);
   for (const char* option : {"--time", "--hours"}) {
     if (line.given(option) && !options.date) line.fail(std::string(option) + " needs --date");
   }

@@ -90,14 +90,12 @@ std::optional<VerifyCommandOptions> parse_verify(const Arguments& arguments, con
   line.group("Ground");
   add_geoid_option(line, options.geoid);
   add_work_options(line, options.work);
-  add_memory_options(line, "that of temporary files", options.work);
+  add_memory_option(line, options.work);
   add_common_options(line, options.common);
   line.footer(kVerifyFooter);
   if (!line.parse(arguments)) return std::nullopt;
-  if (options.work.scratch_folder.empty()) {
-    std::error_code none;
-    options.work.scratch_folder = std::filesystem::temp_directory_path(none).string();
-  }
+  std::error_code none;
+  options.work.scratch_folder = std::filesystem::temp_directory_path(none).string();
   if (options.work.memory_bytes != 0) {
     options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, options.work.memory_bytes / 3);
   }

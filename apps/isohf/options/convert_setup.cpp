@@ -194,7 +194,7 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
       "Measure the archive against INPUT afterwards; print it with the summary, and write it to FILE.json as well",
       [&](const std::string& text) { options.report = text; });
   add_work_options(line, options.work);
-  add_memory_options(line, "OUTPUT's folder", options.work);
+  add_memory_option(line, options.work);
   add_common_options(line, options.common);
   line.footer(kFooter);
   if (!line.parse(arguments)) return std::nullopt;
@@ -223,9 +223,7 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
   options.convert.planes = !no_planes;
   options.inputs.as_given = recorded_options(line);
   check_texture_options(options.texture);
-  if (!line.given("--tmpdir")) {
-    options.work.scratch_folder = options.each.each ? options.each.folder : folder_of(options.output);
-  }
+  options.work.scratch_folder = scratch_folder_for(options.each.each ? options.each.folder + "/" : options.output);
   share_memory(options);
   options.convert.strict = options.common.strict;
   return options;

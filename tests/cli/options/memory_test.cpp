@@ -179,7 +179,10 @@ TEST(Memory, TheDryRunSaysTheLeastAndConvertTakesIt) {
   EXPECT_EQ(folder.names(), std::vector<std::string>{"wide.raw"});
   const std::string enough = std::to_string(least / 1000000 + 1) + "MB";
   EXPECT_GT(nlohmann::json::parse(with({"--dry-run", "--memory", enough}).out).at("scratch_bytes"), 0);
-  const RunResult nowhere = with({"--memory", enough, "--tmpdir", folder / "none"});
+  std::vector<std::string> without_folder = {"/usr/bin/env", "TMPDIR=" + (folder / "none"), isohf_path()};
+  without_folder.insert(without_folder.end(), command.begin(), command.end());
+  without_folder.insert(without_folder.end(), {"--memory", enough});
+  const RunResult nowhere = run_program(without_folder);
   EXPECT_EQ(nowhere.exit_code, 1);
   EXPECT_THAT(nowhere.err, HasSubstr(folder / "none: cannot make a scratch file"));
   EXPECT_EQ(folder.names(), std::vector<std::string>{"wide.raw"});
