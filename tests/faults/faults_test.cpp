@@ -100,7 +100,7 @@ class Faults : public testing::TestWithParam<Job> {
     command.push_back(isohf_path());
     command.insert(command.end(), job().arguments.begin(), job().arguments.end());
     if (job().name != "verify") command.emplace_back("-q");  // whose findings are its words
-    if (job().name != "info") command.insert(command.end(), {"-j", threads});
+    if (!job().name.starts_with("info")) command.insert(command.end(), {"-j", threads});
     RunOptions options;
     options.folder = folder.path();
     ++runs;

@@ -49,9 +49,7 @@ Examples:
 
 struct InfoOptions {
   CommonOptions common;
-  WorkOptions work;
   std::vector<std::string> inputs;
-  bool recursive = false;
   bool tiles = false;
   OpenOptions open;
   bool stats = false;
@@ -65,11 +63,11 @@ std::optional<InfoOptions> parse_info(const Arguments& arguments) {
   line.positionals("INPUT...",
                    "Archives and rasters to describe, one after the other: files, folders, \"patterns*\" and @lists",
                    options.inputs);
-  line.flag("--recursive", "Look into the folders of a folder as well", options.recursive);
   line.flag("--tiles", "List an archive's tiles", options.tiles);
   line.flag("--stats", "Read all samples of a raster: range, mean, voids", options.stats);
-  add_source_options(line, options.open);
-  add_work_options(line, options.work);
+  line.group("Input");
+  add_part_options(line, options.open);
+  add_raw_option(line, options.open);
   add_common_options(line, options.common);
   line.footer(kInfoFooter);
   if (!line.parse(arguments)) return std::nullopt;
@@ -326,7 +324,7 @@ int describe_one(const InfoOptions& options, const std::string& input, bool is_o
     if (options.tiles) {
       throw Error(ErrorCode::kInvalidArgument, "info: --tiles is for archives, " + input + " is none");
     }
-    print_raster_info(input, options.open, options.stats, options.work, options.common, is_one_of_many);
+    print_raster_info(input, options.open, options.stats, options.common, is_one_of_many);
     return kExitDone;
   }
   if (!options.for_rasters.empty()) {
@@ -352,7 +350,7 @@ int describe_one(const InfoOptions& options, const std::string& input, bool is_o
 }
 
 int run(const InfoOptions& options) {
-  const std::vector<std::string> files = list_files(options.inputs, options.recursive, false);
+  const std::vector<std::string> files = list_files(options.inputs, false);
   const bool in_blocks = files.size() > 1 && !options.common.json && !options.common.quiet;
   bool is_first = true;
   return for_each_file("info", files, options.common, [&](const std::string& file) {

@@ -35,43 +35,37 @@ using nlohmann::ordered_json;
 constexpr const char* kVerifyFooter =
     R"(Each finding is one line: its number, its severity, where, what. Exit code 0: nothing above a note was found;
 3: something was, or the surface is further from INPUT than allowed; 1: the check itself failed.
-Options of the input default to what the archive says it was made with.
+The input is read as the archive says that it was read.
 
 Examples:
   isohf verify dem.isohf
-  isohf verify archives/ --recursive --json       one JSON object a line
-  isohf verify dem.isohf --against dem.tif --max-error 5
-  isohf verify --list-checks)";
+  isohf verify archives/ --json       one JSON object a line
+  isohf verify dem.isohf --against dem.tif --max-error 5)";
 
 struct VerifyCommandOptions {
   CommonOptions common;
   WorkOptions work;
   std::vector<std::string> archives;
   std::string archive;  ///< the one in hand
-  SourceInputs against;
-  OpenOptions open;
+  std::vector<std::string> against;
   GeoidRequest geoid;
-  bool geoid_is_recorded = false;  ///< its path is a name without a folder
   std::optional<double> max_error;
   std::optional<double> max_rms;
-  bool list_checks = false;
 };
 
-/// `recorded`: how the archive's input was read; it counts where `arguments` say nothing.
-std::optional<VerifyCommandOptions> parse_verify(const Arguments& arguments, const RecordedOptions& recorded = {}) {
+std::optional<VerifyCommandOptions> parse_verify(const Arguments& arguments) {
   VerifyCommandOptions options;
   CommandLine line("verify", "Checks archives, and compares one with what it was made from.");
   line.group("Arguments");
   line.positionals("ARCHIVE...",
                    "Archives to check, one after the other: files, folders of .isohf, \"patterns*\" and @lists",
                    options.archives);
-  line.flag("--list-checks", "Print what is checked, one finding kind a line, and exit", options.list_checks);
   line.group("Comparison");
   line.repeated(
       "--against", "INPUT",
       "Measure the surface against the raster it was made from; a folder, \"pattern*\" or @list, or again and "
       "again, for a mosaic",
-      options.against.names);
+      options.against);
   const auto limit = [](std::optional<double>& value) {
     return [&value](const std::string& text) {
       double found = 0.0;
@@ -85,9 +79,6 @@ std::optional<VerifyCommandOptions> parse_verify(const Arguments& arguments, con
               limit(options.max_error));
   line.option("--max-rms", "E", "Exit 3 where the root mean square error is above E (default: any passes)",
               limit(options.max_rms));
-  add_source_options(line, options.open);
-  add_mosaic_options(line, options.against);
-  line.group("Ground");
   add_geoid_option(line, options.geoid);
   add_work_options(line, options.work);
   add_memory_option(line, options.work);
@@ -96,21 +87,9 @@ std::optional<VerifyCommandOptions> parse_verify(const Arguments& arguments, con
   if (!line.parse(arguments)) return std::nullopt;
   std::error_code none;
   options.work.scratch_folder = std::filesystem::temp_directory_path(none).string();
-  if (options.work.memory_bytes != 0) {
-    options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, options.work.memory_bytes / 3);
-  }
-  if (!recorded.empty()) {
-    Arguments all = arguments_from(recorded, line);
-    all.insert(all.end(), arguments.begin(), arguments.end());
-    std::optional<VerifyCommandOptions> parsed = parse_verify(all);
-    parsed->geoid_is_recorded = !line.given("--geoid");
-    return parsed;
-  }
-  if (options.list_checks) return options;
   line.require("ARCHIVE", options.archives);
-  if (options.against.names.empty()) {
-    std::string option = line.first_given({"Comparison", "Ground", "Input", "Several inputs"});
-    if (option == "--recursive") option = line.first_given({"Ground"});  // archives are looked for in folders, too
+  if (options.against.empty()) {
+    const std::string option = line.first_given({"Comparison"});
     if (!option.empty()) throw Error(ErrorCode::kInvalidArgument, "verify: " + option + " needs --against INPUT");
   }
   return options;
@@ -126,20 +105,6 @@ const char* to_word(Severity severity) {
       return "error";
   }
   return "?";
-}
-
-void list_checks(bool json) {
-  StandardOutput out;
-  ordered_json list = ordered_json::array();
-  for (const FindingKind& kind : finding_catalogue()) {
-    if (json) {
-      list.push_back({{"id", finding_name(kind.id)}, {"severity", to_word(kind.severity)}, {"meaning", kind.meaning}});
-    } else {
-      out.write(fmt::format("{} {:<7} {}\n", finding_name(kind.id), to_word(kind.severity), kind.meaning));
-    }
-  }
-  if (json) out.write(json_text({{"checks", list}}));
-  out.finish();
 }
 
 ordered_json checks_of(const VerifyReport& report) {
@@ -201,15 +166,22 @@ void find_geoid(const std::string& archive, const std::vector<std::string>& file
 }
 
 /// The archive's input, read as it was read then.
-std::unique_ptr<HeightSource> open_as_recorded(VerifyCommandOptions options, const Metadata& metadata) {
+std::unique_ptr<HeightSource> open_as_recorded(const VerifyCommandOptions& options, const Metadata& metadata) {
   const SourceRecord& record = metadata.source;
-  const std::vector<std::string> files = expand_inputs(options.against.names, options.against.recursive);
-  if (options.geoid_is_recorded && !options.geoid.path.empty()) find_geoid(options.archive, files, options.geoid);
-  OpenOptions& open = options.open;
-  if (!open.registration) open.registration = record.registration;
+  const std::vector<std::string> files = expand_inputs(options.against, false);
+  RecordedInput input = recorded_input(record.options.value_or(RecordedOptions{}));
+  if (options.work.memory_bytes != 0) {
+    input.open.unpacked_bytes = std::min(input.open.unpacked_bytes, options.work.memory_bytes / 3);
+  }
+  if (!options.geoid.path.empty()) {
+    input.geoid = options.geoid;
+  } else if (!input.geoid.path.empty()) {
+    find_geoid(options.archive, files, input.geoid);
+  }
+  if (!input.open.registration) input.open.registration = record.registration;
   // Inputs of different reference systems were joined in that of the record.
   if (const std::string system = system_text(source_georeference(record).system); record.mosaic && !system.empty()) {
-    ProjectionRequest& onto = options.against.onto;
+    ProjectionRequest& onto = input.inputs.onto;
     onto.is_auto = false;
     onto.is_given = true;
     onto.kind = ProjectionKind::kSystem;
@@ -217,7 +189,7 @@ std::unique_ptr<HeightSource> open_as_recorded(VerifyCommandOptions options, con
   }
   GroundRequest ground;
   ground.wrap_x = metadata.wraps_x;
-  return laid_out(std::move(open_inputs(files, options.against, open, options.work).source), options.geoid, ground);
+  return laid_out(open_inputs(files, input.inputs, input.open, options.work).source, input.geoid, ground);
 }
 
 /// What of the measured error is more than was allowed; empty where nothing is.
@@ -231,7 +203,7 @@ std::string why_too_far(const VerifyCommandOptions& options, const AccuracyRepor
   return {};
 }
 
-int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_one_of_many) {
+int check_one(const VerifyCommandOptions& options, bool is_one_of_many) {
   std::optional<ProgressDisplay> display(std::in_place, options.work.progress, options.common.quiet,
                                          options.common.verbose);
   const Job job = job_from(options.work, *display);
@@ -243,14 +215,10 @@ int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_
   }
   std::optional<Accuracy> accuracy;
   // An archive that is not whole has no surface to measure.
-  const bool compares = !options.against.names.empty() && report.passed();
+  const bool compares = !options.against.empty() && report.passed();
   if (compares) {
     const ArchiveReader archive = open_archive(options.archive);
     const Metadata& metadata = archive.metadata();
-    if (metadata.source.options) {
-      options = *parse_verify(arguments, *metadata.source.options);
-      options.archive = archive.path();
-    }
     const std::unique_ptr<HeightSource> source = open_as_recorded(options, metadata);
     const SourceInfo& info = source->info();
     const auto same_system = are_same(source_georeference(metadata.source).system, info.georeference.system);
@@ -275,9 +243,8 @@ int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_
     for (const Finding& finding : report.findings) out.write(text_from(finding));
     const std::int64_t not_listed = report.findings_total - static_cast<std::int64_t>(report.findings.size());
     if (not_listed > 0) out.write(fmt::format("and {} more\n", describe_count(not_listed)));
-    if (accuracy) out.write(text_from(*accuracy, fmt::format("{}", fmt::join(options.against.names, " "))));
-    if (!options.against.names.empty() && !compares)
-      out.write("not compared with the input: the archive is not whole\n");
+    if (accuracy) out.write(text_from(*accuracy, fmt::format("{}", fmt::join(options.against, " "))));
+    if (!options.against.empty() && !compares) out.write("not compared with the input: the archive is not whole\n");
     if (!too_far.empty()) out.write("difference: " + too_far + "\n");
     out.write(fmt::format("{}: {}: {} tiles and {} shared vertices checked, {} findings\n", printable(options.archive),
                           passed ? "passed" : "FAILED", describe_count(report.tiles_checked),
@@ -287,13 +254,9 @@ int check_one(VerifyCommandOptions options, const Arguments& arguments, bool is_
   return passed ? kExitDone : kExitDifferences;
 }
 
-int run(const VerifyCommandOptions& options, const Arguments& arguments) {
-  if (options.list_checks) {
-    list_checks(options.common.json);
-    return kExitDone;
-  }
-  const std::vector<std::string> files = list_files(options.archives, options.against.recursive, true);
-  if (files.size() > 1 && !options.against.names.empty()) {
+int run(const VerifyCommandOptions& options) {
+  const std::vector<std::string> files = list_files(options.archives, true);
+  if (files.size() > 1 && !options.against.empty()) {
     throw Error(
         ErrorCode::kInvalidArgument,
         fmt::format("verify: --against compares one archive with its input, {} archives are given; every file of "
@@ -304,7 +267,7 @@ int run(const VerifyCommandOptions& options, const Arguments& arguments) {
   return for_each_file("verify", files, options.common, [&](const std::string& file) {
     VerifyCommandOptions one = options;
     one.archive = file;
-    return check_one(std::move(one), arguments, files.size() > 1);
+    return check_one(one, files.size() > 1);
   });
 }
 
@@ -312,7 +275,7 @@ int run(const VerifyCommandOptions& options, const Arguments& arguments) {
 
 int command_verify(const Arguments& arguments) {
   const std::optional<VerifyCommandOptions> options = parse_verify(arguments);
-  return options ? run(*options, arguments) : static_cast<int>(kExitDone);
+  return options ? run(*options) : static_cast<int>(kExitDone);
 }
 
 }  // namespace isohf::cli

@@ -94,7 +94,7 @@ std::vector<std::string> files_of_folder(const std::string& folder, bool recursi
     const std::string rasters = fmt::format("raster that isohf reads ({})", fmt::join(raster_extensions(), ", "));
     refuse(folder, fmt::format("holds no {}{}{}", wanted == Wanted::kRasters ? "" : "archive (.isohf)",
                                wanted == Wanted::kBoth ? " and no " : "", wanted == Wanted::kArchives ? "" : rasters) +
-                       (recursive ? "" : "; --recursive looks into its folders too"));
+                       (recursive || wanted != Wanted::kRasters ? "" : "; --recursive looks into its folders too"));
   }
   return found;
 }
@@ -184,7 +184,7 @@ std::vector<std::string> expand_inputs(const std::vector<std::string>& inputs, b
   return found;
 }
 
-std::vector<std::string> list_files(const std::vector<std::string>& inputs, bool recursive, bool only_archives) {
+std::vector<std::string> list_files(const std::vector<std::string>& inputs, bool only_archives) {
   const Wanted wanted = only_archives ? Wanted::kArchives : Wanted::kBoth;
   std::vector<std::string> found;
   for (const std::string& input : inputs) {
@@ -192,10 +192,10 @@ std::vector<std::string> list_files(const std::vector<std::string>& inputs, bool
     const fs::file_status status = fs::status(input, error);
     std::vector<std::string> files = {input};
     if (input.size() > 1 && input.front() == '@') {
-      files = files_of_list(input.substr(1), recursive, wanted);
+      files = files_of_list(input.substr(1), false, wanted);
     } else if (fs::is_directory(status) ||
                (status.type() == fs::file_type::not_found && input.find_first_of("*?[") != std::string::npos)) {
-      files = files_of(input, recursive, wanted);
+      files = files_of(input, false, wanted);
     }
     std::move(files.begin(), files.end(), std::back_inserter(found));
   }

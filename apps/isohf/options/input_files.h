@@ -30,8 +30,7 @@ struct InputFile {
 
 /// The files that a command goes through one after the other, each on its own: as above, but archives (.isohf) of a
 /// folder as well, or nothing else with `only_archives`, and what names a file is taken as it is, there or not.
-[[nodiscard]] std::vector<std::string> list_files(const std::vector<std::string>& inputs, bool recursive,
-                                                  bool only_archives);
+[[nodiscard]] std::vector<std::string> list_files(const std::vector<std::string>& inputs, bool only_archives);
 
 /// Goes through files one after the other: `work` returns an exit code or throws Error, which is said and does not keep
 /// the others from their turn; with `json` it is an object on a line as well. Of several files a line on standard error

@@ -34,8 +34,7 @@ std::string system_from(const std::string& text) {
   return held;
 }
 
-void add_source_options(CommandLine& line, OpenOptions& options) {
-  line.group("Input");
+void add_part_options(CommandLine& line, OpenOptions& options) {
   line.option(
       "--channel", "NAME|N",
       "Read this channel alone, by name or number from 0, without masks and opacity (default: the only or first "
@@ -45,6 +44,18 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
               "Read this file of an archive, or this part of an OpenEXR file, by name or number from 0, or this zoom "
               "level of tiles",
               options.part);
+}
+
+void add_raw_option(CommandLine& line, OpenOptions& options) {
+  line.option("--raw", "WxH:TYPE",
+              "Read bare samples: columns, rows, and u8, i8, or u16, i16, u32, i32, f32, f64 with le or be, as in "
+              "200x200:u16le",
+              [&](const std::string& text) { options.raw = raw_layout_from_string(text); });
+}
+
+void add_source_options(CommandLine& line, OpenOptions& options) {
+  line.group("Input");
+  add_part_options(line, options);
   line.option(
       "--encoding", "NAME",
       "Decode elevations packed into the colours of PNG or WebP: terrarium, mapbox or rgba-float (default: decode, "
@@ -90,10 +101,7 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
               });
   line.option("--z-offset", "NUMBER", "Add NUMBER to scaled values (default: the file's, else 0)",
               [&](const std::string& text) { options.z_offset = parse_number_in(text, -1e20, 1e20); });
-  line.option("--raw", "WxH:TYPE",
-              "Read bare samples: columns, rows, and u8, i8, or u16, i16, u32, i32, f32, f64 with le or be, as in "
-              "200x200:u16le",
-              [&](const std::string& text) { options.raw = raw_layout_from_string(text); });
+  add_raw_option(line, options);
   line.flag("--ignore-checksums",
             "Take the columns of DTED files whose checksum is wrong as they are (default: refuse)",
             options.ignore_checksums);
@@ -105,10 +113,6 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
               "string, or a file with one of them",
               [&](const std::string& text) { options.reference_system = system_from(text); });
   line.exclusive({"--crs", "--sample-spacing"});
-}
-
-std::unique_ptr<HeightSource> open_input(const std::string& path, const OpenOptions& options) {
-  return with_voids_treated(open_raster(path, options), options.voids);
 }
 
 }  // namespace isohf::cli

@@ -11,6 +11,8 @@
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "options/option_values.h"
+#include "options/options_ground.h"
+#include "options/options_source.h"
 #include "work_arena.h"
 
 namespace isohf::cli {
@@ -131,14 +133,22 @@ RecordedOptions recorded_options(const CommandLine& line) {
   return recorded;
 }
 
-Arguments arguments_from(const RecordedOptions& recorded, const CommandLine& line) {
+RecordedInput recorded_input(const RecordedOptions& recorded) {
+  RecordedInput input;
+  CommandLine line("the input's options", "");
+  add_source_options(line, input.open);
+  add_mosaic_options(line, input.inputs);
+  add_geoid_option(line, input.geoid);
   Arguments arguments;
   for (const auto& [name, text] : recorded) {
-    const bool names_channel = name == "channel" || name == "encoding";
-    const bool given = names_channel ? line.given("--channel") || line.given("--encoding") : line.given("--" + name);
-    if (!given) arguments.push_back(fmt::format("--{}={}", name, text));
+    // The line's own, which an archive that was altered may name: they read files and print.
+    if (name == "config" || name == "help" || name == "version") {
+      throw Error(ErrorCode::kCorrupt, "the metadata record --" + name + ", which is no option of an input");
+    }
+    arguments.push_back(fmt::format("--{}={}", name, text));
   }
-  return arguments;
+  static_cast<void>(line.parse(arguments));
+  return input;
 }
 
 OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inputs, const OpenOptions& options,

@@ -11,6 +11,7 @@
 #include "formats/registry.h"
 #include "isohf/convert.h"
 #include "isohf/raster.h"
+#include "isohf/surface/decorate/geoid_source.h"
 #include "options/command_line.h"
 #include "options/options_common.h"
 
@@ -36,8 +37,15 @@ void add_mosaic_options(CommandLine& line, SourceInputs& inputs);
 /// After parsing: the options of the groups "Input" and "Several inputs" that say how samples are read, and of a geoid
 /// the file's name, not its folder.
 [[nodiscard]] RecordedOptions recorded_options(const CommandLine& line);
-/// The arguments that the recorded options make, of those that `line` was not given.
-[[nodiscard]] Arguments arguments_from(const RecordedOptions& recorded, const CommandLine& line);
+
+/// An input's options, as an archive records them.
+struct RecordedInput {
+  SourceInputs inputs;
+  OpenOptions open;
+  GeoidRequest geoid;  ///< by its name, without a folder
+};
+/// Throws Error for what are no such options.
+[[nodiscard]] RecordedInput recorded_input(const RecordedOptions& recorded);
 
 /// Inputs, opened as one source.
 struct OpenedInputs {

@@ -18,12 +18,10 @@
 #include "isohf/surface/source/source_rows.h"
 #include "isohf/surface/source/source_statistics.h"
 #include "options/describe.h"
-#include "options/options_source.h"
 #include "options/source_place.h"
 #include "output/json_output.h"
 #include "output/progress.h"
 #include "output/standard_output.h"
-#include "output/void_counts_output.h"
 
 namespace isohf::cli {
 namespace {
@@ -34,10 +32,8 @@ struct RasterInfo {
   SourceInfo source;
   std::string library;
   Registration registration = Registration::kPoint;  ///< as used
-  const char* registration_from = "";                ///< "option", "file" or "default"
   std::optional<SourcePlace> place;
   std::optional<SourceSurvey> survey;
-  std::optional<VoidCounts> voids;
 };
 
 Registration registration_used(const Georeference& place) {
@@ -45,9 +41,9 @@ Registration registration_used(const Georeference& place) {
   return place.has_origin ? Registration::kArea : Registration::kPoint;
 }
 
-SourceSurvey survey(HeightSource& source, const WorkOptions& work, const CommonOptions& common) {
+SourceSurvey survey(HeightSource& source, const CommonOptions& common) {
   const std::atomic<bool>& cancel = watch_interrupts();
-  ProgressDisplay display(work.progress, common.quiet, common.verbose);
+  ProgressDisplay display(ProgressMode::kAuto, common.quiet, common.verbose);
   const SourceInfo& info = source.info();
   constexpr std::uint64_t kReadBytes = std::uint64_t{8} << 20U;
   const ReadStep step = ReadStep::make(info, kReadBytes);
@@ -99,11 +95,14 @@ std::string describe_reference(const ReferenceSystem& system) {
   return text;
 }
 
+bool is_from_file(const RasterInfo& raster) {
+  return raster.source.georeference.registration != Registration::kUnknown;
+}
+
 std::string describe_registration(const RasterInfo& raster) {
   std::string text = to_string(raster.registration);
   text += raster.registration == Registration::kArea ? ": samples in the middle of pixels" : ": samples on posts";
-  if (raster.registration_from == std::string("option")) return text + ", by --registration";
-  if (raster.registration_from == std::string("file")) return text + ", as the file says";
+  if (is_from_file(raster)) return text + ", as the file says";
   return text + (raster.source.georeference.has_origin ? ", taken for granted with a georeference"
                                                        : ", taken for granted without a georeference");
 }
@@ -159,7 +158,6 @@ std::string text_from(const RasterInfo& raster) {
     }
     say("samples",
         fmt::format("{}, {} of them void", describe_count(scan.valid + scan.voids), describe_count(scan.voids)));
-    if (raster.voids && (info.valid_range || info.fill_distance > 0)) say("treated", text_from_voids(*raster.voids));
   }
   return text;
 }
@@ -215,7 +213,7 @@ ordered_json document_of(const RasterInfo& raster, const std::vector<Warning>& w
   json["metres_per_unit"] = place.unit == HorizontalUnit::kMetre ? ordered_json(place.metres_per_unit) : nullptr;
   add_source_place(raster.place, json);
   json["registration"] = to_string(raster.registration);
-  json["registration_from"] = raster.registration_from;
+  json["registration_from"] = is_from_file(raster) ? "file" : "default";
   json["crs"] = {{"name", or_null(system.name)}, {"epsg", or_null(system.epsg)}, {"wkt", or_null(system.wkt)}};
   json["body"] = {{"name", or_null(system.body)},
                   {"semi_major_axis_m", or_null(system.semi_major_axis_m)},
@@ -227,7 +225,6 @@ ordered_json document_of(const RasterInfo& raster, const std::vector<Warning>& w
   json["void_values"] = voids;
   json["valid_samples"] = {{"min", number_or_text(info.valid_min)}, {"max", number_or_text(info.valid_max)}};
   json["statistics"] = raster.survey ? document_of(*raster.survey) : ordered_json(nullptr);
-  json["voids"] = json_from_voids(raster.voids);
   json["warnings"] = warnings;
   return json;
 }
@@ -248,22 +245,19 @@ bool is_archive(const std::string& path, const OpenOptions& options) {
 }
 
 void print_raster_info(const std::string& path, const OpenOptions& options, bool with_statistics,
-                       const WorkOptions& work, const CommonOptions& common, bool is_one_of_many) {
-  const std::unique_ptr<HeightSource> source = open_input(path, options);
+                       const CommonOptions& common, bool is_one_of_many) {
+  const std::unique_ptr<HeightSource> source = open_raster(path, options);
   RasterInfo raster;
   raster.source = source->info();
   const Format* const format = native_format_of(path, options);
   raster.library = format != nullptr ? library_of(*format) : "OpenImageIO";
   const Georeference& place = raster.source.georeference;
   raster.registration = registration_used(place);
-  raster.registration_from =
-      options.registration ? "option" : (place.registration != Registration::kUnknown ? "file" : "default");
   raster.place =
       source_place(place, raster.source.width, raster.source.height, raster.registration == Registration::kArea);
   std::vector<Warning> warnings = raster.source.warnings;
   if (with_statistics) {
-    raster.survey = survey(*source, work, common);
-    raster.voids = counts_of_voids(*source, raster.survey->scan().voids);
+    raster.survey = survey(*source, common);
     if (const std::string warning = raster.survey->warning(); !warning.empty()) warnings.push_back(warning);
   }
   std::vector<Warning> named;

@@ -14,6 +14,6 @@ namespace isohf::cli {
 
 /// Prints what is understood of a raster; `with_statistics` reads all of it. JSON of one of many takes a line.
 void print_raster_info(const std::string& path, const OpenOptions& options, bool with_statistics,
-                       const WorkOptions& work, const CommonOptions& common, bool is_one_of_many);
+                       const CommonOptions& common, bool is_one_of_many);
 
 }  // namespace isohf::cli

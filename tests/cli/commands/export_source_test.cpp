@@ -84,16 +84,16 @@ class ExportAsSource : public testing::Test {
 
 TEST_F(ExportAsSource, SaysInOneLineWhatItWrote) {
   convert(kCoast);
-  EXPECT_EQ(run("back.tif").out, folder / "back.tif" + ": 512 x 384 samples of int16, 20 x 20 apart\n");
+  EXPECT_EQ(run("back.tif").out, folder / "back.tif" + ": 512 x 384 samples of int16, 30 x 30 apart\n");
   const json said = json::parse(run("json.tif", {"--json"}).out);
   EXPECT_EQ(said.at("method"), "hex");
   EXPECT_EQ(said.at("voids"), 0);
   EXPECT_EQ(said.at("clamped"), 0);
   EXPECT_EQ(said.at("source_samples"), false);
   convert(kCoast, {"--lossless"});
-  EXPECT_EQ(run("exact.tif").out,
-            folder / "exact.tif" +
-                ": 512 x 384 samples of int16, 20 x 20 apart, the source's own, SHA-256 as stated\n");
+  EXPECT_EQ(
+      run("exact.tif").out,
+      folder / "exact.tif" + ": 512 x 384 samples of int16, 30 x 30 apart, the source's own, SHA-256 as stated\n");
   const json exact = json::parse(run("exact2.tif", {"--json"}).out);
   EXPECT_EQ(exact.at("method"), "source");
   EXPECT_EQ(exact.at("source_samples"), true);

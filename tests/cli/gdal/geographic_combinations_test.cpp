@@ -139,7 +139,7 @@ class GeographicCombinations : public testing::Test {
     EXPECT_TRUE(read_file(folder / "whole.isohf") == read_file(folder / "a.isohf"));
     for (const std::string& input : {folder / "whole.flt", folder / "pieces"}) {
       const RunResult verified =
-          run_with({"verify", folder / "a.isohf", "--against", input, "--json"}, at.source_options(folder));
+          run_isohf({"verify", folder / "a.isohf", "--against", input, "--json"});
       ASSERT_EQ(verified.exit_code, 0) << verified.out << verified.err;
       const json against = json::parse(verified.out).at("against");
       EXPECT_EQ(against.at("vertices").at("wrong"), 0);

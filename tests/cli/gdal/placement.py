@@ -536,11 +536,11 @@ def feet(isohf, folder):
                                           ("both.tif", (), False, "US survey foot"),
                                           ("both.tif", ("--crs", "EPSG:2263"), False, "US survey foot"),
                                           ("both.tif", ("--crs", "EPSG:2263+5703", "--z-scale", "0.3048006096"), False, "metre")):
-        said = isohf.must("info", folder / name, "--json", *options)
+        said = isohf.must("convert", folder / name, "-o", folder / "f.isohf", "--overwrite", "--json", *options)
         check((asks in said.stderr) == is_asked, f"{name} {options}: {said.stderr}")
-        found = json.loads(said.stdout)
-        check(f'"vertical_unit": {json.dumps(unit)}' in json.dumps(found), f"{name} {options}: another unit than {unit}: {found}")
-    isohf.refuses("--z-scale 0.304800609601", "info", folder / "both.tif", "--crs", "EPSG:2263+5703")
+        found = json.loads(said.stdout)["metadata"]["units"]["vertical"]
+        check(found == (unit or "unknown"), f"{name} {options}: another unit than {unit}: {found}")
+    isohf.refuses("--z-scale 0.304800609601", "plan", folder / "both.tif", "--crs", "EPSG:2263+5703")
     isohf.refuses("--z-scale 0.304800609601", "convert", folder / "both.tif", "-o", folder / "n.isohf", "--crs", "EPSG:32618+5773")
 
 
@@ -599,7 +599,7 @@ def rotated(isohf, folder):
     raster = None
     isohf.refuses("rotated pole", "convert", folder / "turned.tif", "-o", folder / "n.isohf")
     write(folder / "plain.tif", "EPSG:4326", 9.0, 46.0, 30.0, (9.0, 46.0), 0, 40)
-    isohf.refuses("rotated pole", "info", folder / "plain.tif", "--crs", "+proj=ob_tran +o_proj=longlat +o_lat_p=39.25 +o_lon_p=0 +lon_0=18 +R=6371229")
+    isohf.refuses("rotated pole", "plan", folder / "plain.tif", "--crs", "+proj=ob_tran +o_proj=longlat +o_lat_p=39.25 +o_lon_p=0 +lon_0=18 +R=6371229")
 
 
 # Of a program that a small process starts: its peak would count that of a large one.

@@ -202,7 +202,7 @@ def read(isohf, folder):
     isohf.holds(folder / "l.pmtiles", large, 9, "mapbox", side=512)
     runs = {place: sea[BLOCK[0]] for place in [(6, x, y) for x in range(64) for y in range(64)]}
     (folder / "runs.pmtiles").write_bytes(pmtiles(runs))
-    said = json.loads(isohf.run("info", folder / "runs.pmtiles", "--encoding", "mapbox", "--json").stdout)
+    said = json.loads(isohf.run("info", folder / "runs.pmtiles", "--channel", "mapbox", "--json").stdout)
     check("4096" in json.dumps(said), f"64 x 64 tiles in one run: {said}")
 
 
@@ -212,7 +212,7 @@ def folders(isohf, folder):
         isohf.holds(folder_of(folder / ending, tiles, ending), tiles, 9, "terrarium", "--recursive", "--encoding", "terrarium")
     rim = tiles_of(BLOCK[:1], "mapbox", 258)
     folder_of(folder / "rim", rim, "png")
-    said = isohf.run("info", folder / "rim/9/266/180.png", "--encoding", "mapbox").stderr
+    said = isohf.run("info", folder / "rim/9/266/180.png", "--channel", "mapbox").stderr
     check("rim of their neighbours'" in said, f"a tile with a rim: {said}")
 
 

@@ -87,11 +87,10 @@ TEST_F(ManyFiles, FoldersPatternsAndListsAreTaken) {
     return names;
   };
   EXPECT_THAT(archives({folder / "in"}), ElementsAre("a.isohf"));
-  EXPECT_THAT(archives({folder / "in", "--recursive"}), ElementsAre("a.isohf", "c.isohf"));
   EXPECT_THAT(archives({folder / "in/*.isohf", folder / "in/deeper/c.isohf"}), ElementsAre("a.isohf", "c.isohf"));
   write_file(folder / "list.txt", std::string_view("in/deeper/c.isohf\nin/a.isohf\n"));
   EXPECT_THAT(archives({"@" + (folder / "list.txt")}), ElementsAre("c.isohf", "a.isohf"));
-  EXPECT_EQ(run_isohf({"verify", folder / "in", "--recursive", "--against", kRaster}).exit_code, 2);
+  EXPECT_EQ(run_isohf({"verify", folder / "in/a.isohf", folder / "in/deeper/c.isohf", "--against", kRaster}).exit_code, 2);
 }
 
 TEST_F(ManyFiles, DataOfEnviAreRastersOfAFolderWhereTheirHeaderIsThere) {
@@ -106,11 +105,11 @@ TEST_F(ManyFiles, DataOfEnviAreRastersOfAFolderWhereTheirHeaderIsThere) {
 }
 
 TEST_F(ManyFiles, AreDescribedOneAfterTheOther) {
-  const RunResult text = run_isohf({"info", folder / "in", "--recursive"});
+  const RunResult text = run_isohf({"info", folder / "in", folder / "in/deeper"});
   EXPECT_EQ(text.exit_code, 0) << text.err;
   EXPECT_THAT(text.out, testing::AllOf(HasSubstr("archive      "), HasSubstr("\n\nraster       ")));
   EXPECT_EQ(text.err, "isohf: info: 3 files: 3 done, 0 failed\n");
-  const std::vector<json> lines = lines_of(run_isohf({"info", folder / "in", "--recursive", "--json"}).out);
+  const std::vector<json> lines = lines_of(run_isohf({"info", folder / "in", folder / "in/deeper", "--json"}).out);
   ASSERT_EQ(lines.size(), 3U);
   EXPECT_TRUE(lines[0].contains("archive"));
   EXPECT_TRUE(lines[1].contains("raster"));

@@ -37,8 +37,7 @@ class MaxError : public testing::Test {
     return run_isohf(arguments);
   }
   json against() {
-    const RunResult result =
-        run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--nodata=-32768", "--json"});
+    const RunResult result = run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--json"});
     EXPECT_EQ(result.exit_code, 0) << result.out;
     return json::parse(result.out).at("against");
   }
@@ -145,7 +144,7 @@ TEST_F(MaxError, AReportIsKeptInTheMetadata) {
 
 TEST_F(MaxError, PlanAndSummaryExpectTheErrorToAFactorOfTwo) {
   for (const std::vector<std::string>& way : std::vector<std::vector<std::string>>{{}, {"--density", "0.3"}}) {
-    std::vector<std::string> arguments = {"plan", folder / "a.tif", "--nodata=-32768", "--json"};
+    std::vector<std::string> arguments = {"plan", folder / "a.tif", "--json"};
     arguments.insert(arguments.end(), way.begin(), way.end());
     const json planned = json::parse(run_isohf(arguments).out).at("expected_error");
     std::vector<std::string> more = {"--json"};

@@ -142,7 +142,6 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(3, "verify", {"verify", folder / "bad.isohf"});
   documents.run(0, "verify-line", {"verify", a, b});
   documents.run(1, "verify-line", {"verify", a, folder / "bad.isohf", folder / "none.isohf"});
-  documents.run(0, "verify", {"verify", "--list-checks"});
   documents.run(1, "error", {"verify", folder / "none.isohf"});
 
   documents.run(0, "export", {"export", a, folder / "a.tif"});
