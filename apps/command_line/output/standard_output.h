@@ -32,8 +32,6 @@ class StandardOutput {
  public:
   /// Text that may quote files: control characters but for ends of lines and tabs become blanks, as printable() has it.
   void write(std::string_view text);
-  /// Records that are no text, as they are.
-  void write_bytes(std::string_view bytes) { write_styled(bytes); }
   /// Text of the program's own, with escape codes.
   void write_styled(std::string_view text);
   /// Hands everything to the operating system.

@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -13,7 +12,6 @@
 #include "commands/line_reader.h"
 #include "formats/georeference/units.h"
 #include "isohf/archive.h"
-#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 #include "isohf/restore/ground_scale.h"
 #include "isohf/surface.h"
@@ -44,17 +42,12 @@ With --shadow two numbers follow: the elevation up to which the surface's shadow
 sun that is seen, 0 to 1, from the surface or from --above it. Nothing is swept: the line to the sun is followed over
 each triangle.
 
-With --binary places are pairs of little-endian float64, and each answer is 32 bytes, little-endian: float64
-elevation, float32 nx ny nz, uint32 state (0 surface, 1 void, 2 outside), int32 tile_column tile_row; with --shadow 16
-more, float64 shadow elevation and share. Elevations and the share are NaN and the normal 0 unless the state is 0; the
-tile is -1 -1 where it is 2.
-
 Examples:
   isohf sample dem.isohf --at 1200.5 340
   isohf sample dem.isohf --at-lonlat 6.865 45.833
   isohf sample dem.isohf --at-crs 334000 5077500 --with-lonlat      in metres of the input's own map
   isohf sample dem.isohf < places.txt > elevations.txt
-  isohf sample dem.isohf --at 1200.5 340 --shadow --azimuth 120 --altitude 8 --above 30    a roof)";
+  isohf sample dem.isohf --at 1200.5 340 --shadow --azimuth 120 --sun-elevation 8 --above 30    a roof)";
 
 struct SampleOptions {
   CommonOptions common;
@@ -66,12 +59,10 @@ struct SampleOptions {
   bool reads_source = false;   ///< standard input holds coordinates of the source
   bool with_degrees = false;   ///< answers hold them
   bool with_source = false;
-  bool binary = false;
   bool with_shadow = false;
   Sun sun;
   double above = 0.0;
   int threads = 0;
-  std::uint64_t memory_bytes = std::uint64_t{256} << 20;
 };
 
 double parse_height(const std::string& text) {
@@ -102,32 +93,22 @@ std::optional<SampleOptions> parse_sample(const Arguments& arguments) {
   line.flag("--with-lonlat", "Add longitude and latitude to each line", options.with_degrees);
   line.flag("--with-crs", "Add the input's own coordinates to each line", options.with_source);
   line.exclusive({"--at", "--at-lonlat", "--at-crs", "--lonlat", "--crs"});
-  line.flag("--binary", "Read and write binary records instead of lines; see below", options.binary);
   line.group("Shadow");
   line.flag("--shadow", "Add the shadow's elevation and the share of the sun that is seen", options.with_shadow);
   line.option("--azimuth", "DEG", "Where the sun stands, clockwise from North; N, E, S or W (default 270)",
               [&](const std::string& text) { options.sun.azimuth_deg = parse_azimuth(text); });
-  line.option("--altitude,--sun-elevation", "DEG", "Height of the sun above the horizon, 0.01 to 90 (default 15)",
+  line.option("--sun-elevation", "DEG", "Height of the sun above the horizon, 0.01 to 90 (default 15)",
               [&](const std::string& text) { options.sun.elevation_deg = parse_altitude(text); });
   line.option("--above", "H", "Height above the surface that the sun is seen from, vertical units (default 0)",
               [&](const std::string& text) { options.above = parse_height(text); });
-  line.option("--shadow-softness", "K",
-              "One size of all penumbrae, vertical units (default: the sun's disc, whose penumbra grows with the "
-              "caster's distance)",
-              [&](const std::string& text) { options.sun.softness = parse_positive_number(text); });
   line.group("Work");
   line.option("-j,--threads", "N", "Threads, 1 to 1024 (default: all cores); the result does not depend on it",
               [&](const std::string& text) { options.threads = static_cast<int>(parse_whole_number(text, 1, 1024)); });
-  line.option("--memory", "SIZE", "Decoded tiles to keep (default 256M); as in 400M or 1.5GiB",
-              [&](const std::string& text) { options.memory_bytes = parse_bytes(text); });
   add_common_options(line, options.common);
-  line.exclusive({"--json", "--binary"});
-  line.exclusive({"--with-lonlat", "--binary"});
-  line.exclusive({"--with-crs", "--binary"});
   line.footer(kSampleFooter);
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
-  for (const char* option : {"--azimuth", "--sun-elevation", "--above", "--shadow-softness"}) {
+  for (const char* option : {"--azimuth", "--sun-elevation", "--above"}) {
     if (!options.with_shadow && line.given(option))
       line.fail(std::string(option) + " is for --shadow, which is not given");
   }
@@ -210,33 +191,11 @@ std::string line_of(const SurfaceSample& sample, const SunSample* sun, WorldPoin
   return json_line(json);
 }
 
-std::string record_from(const SurfaceSample& sample, const SunSample* sun) {
-  std::vector<std::byte> bytes;
-  ByteWriter writer(bytes);
-  const bool is_surface = sample.state == SurfaceState::kSurface;
-  writer.write(is_surface ? sample.elevation : std::numeric_limits<double>::quiet_NaN());
-  for (const double part : sample.normal) writer.write(is_surface ? static_cast<float>(part) : 0.0F);
-  writer.write(static_cast<std::uint32_t>(sample.state));
-  writer.write(static_cast<std::int32_t>(sample.tile.column));
-  writer.write(static_cast<std::int32_t>(sample.tile.row));
-  if (sun != nullptr) {
-    writer.write(sun->shadow_height);
-    writer.write(sun->share);
-  }
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
-Job job_of(const SampleOptions& options) {
-  Job job;
-  job.memory_bytes = options.memory_bytes;
-  return job;  // its threads are those of the arena around it, which answers are written on as well
-}
-
 /// Collects places and answers them together, in their order.
 class Answers {
  public:
   Answers(const ArchiveReader& archive, const SampleOptions& options, const PlaceOutput& output)
-      : options_(options), output_(output), surface_(archive, job_of(options)) {}
+      : options_(options), output_(output), surface_(archive, job()) {}
 
   void add(WorldPoint place) {
     places_.push_back(place);
@@ -252,6 +211,14 @@ class Answers {
  private:
   static constexpr std::size_t kMostPlaces = std::size_t{1} << 18U;
   static constexpr std::size_t kPlacesOfText = 4096;
+  static constexpr std::uint64_t kTileBytes = std::uint64_t{256} << 20U;  ///< decoded tiles that are kept
+
+  /// Its threads are those of the arena around it, which answers are written on as well.
+  static Job job() {
+    Job job;
+    job.memory_bytes = kTileBytes;
+    return job;
+  }
 
   void answer() {
     std::vector<SurfaceSample> samples(places_.size());
@@ -266,12 +233,11 @@ class Answers {
       const std::size_t end = std::min((part + 1) * kPlacesOfText, samples.size());
       for (std::size_t i = part * kPlacesOfText; i < end; ++i) {
         const SunSample* sun = options_.with_shadow ? &suns[i] : nullptr;
-        texts[part] += options_.binary        ? record_from(samples[i], sun)
-                       : options_.common.json ? line_of(samples[i], sun, places_[i], output_)
-                                              : text_from(samples[i], sun) + columns_from(output_, places_[i]);
+        texts[part] += options_.common.json ? line_of(samples[i], sun, places_[i], output_)
+                                            : text_from(samples[i], sun) + columns_from(output_, places_[i]);
       }
     });
-    for (const std::string& text : texts) options_.binary ? out_.write_bytes(text) : out_.write(text);
+    for (const std::string& text : texts) out_.write(text);
     places_.clear();
   }
 
@@ -290,20 +256,10 @@ class Answers {
 };
 
 /// Every place on standard input: x and z, or longitude and latitude.
-void read_places(bool binary, Answers& answers, const std::function<WorldPoint(WorldPoint)>& in_world) {
+void read_places(Answers& answers, const std::function<WorldPoint(WorldPoint)>& in_world) {
   LineReader reader;
   const auto flush = [&] { answers.flush(); };
   WorldPoint place{};
-  while (binary) {
-    const std::string_view record = reader.next_record(2 * sizeof(double), flush);
-    if (record.empty()) return;
-    place = {load_little<double>(record.data()), load_little<double>(record.data() + sizeof(double))};
-    if (!std::isfinite(place.x) || !std::isfinite(place.z)) {
-      throw Error(ErrorCode::kCorrupt, fmt::format("standard input, record {}: found {} {}, must be two finite numbers",
-                                                   reader.line_number(), place.x, place.z));
-    }
-    answers.add(in_world(place));
-  }
   while (const std::optional<std::string> line = reader.next(flush)) {
     const std::size_t first = line->find_first_not_of(" \t");
     if (first == std::string::npos || (*line)[first] == '#') continue;
@@ -361,7 +317,7 @@ int run(SampleOptions options) {
     for (const MapPoint place : options.source_places) answers.add(places.world_from_source(place));
     if (options.places.empty() && options.geo_places.empty() && options.source_places.empty()) {
       try {
-        read_places(options.binary, answers, [&](WorldPoint place) {
+        read_places(answers, [&](WorldPoint place) {
           if (takes_geo) return places.world_from_geo({place.x, place.z});
           return takes_source ? places.world_from_source({place.x, place.z}) : place;
         });

@@ -33,19 +33,6 @@ std::optional<std::string> LineReader::take_line() {
   return line;
 }
 
-std::string_view LineReader::take_record(std::size_t bytes) {
-  const std::size_t left = buffer_.size() - from_;
-  if (left == 0) return {};
-  ++line_number_;
-  if (left < bytes) {
-    throw Error(ErrorCode::kCorrupt,
-                fmt::format("standard input, record {}: ends after {} bytes, must have {}", line_number_, left, bytes));
-  }
-  const std::string_view record(buffer_.data() + from_, bytes);
-  from_ += bytes;
-  return record;
-}
-
 bool LineReader::would_wait() {
   struct pollfd input {
     STDIN_FILENO, POLLIN, 0

@@ -3,11 +3,10 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <string_view>
 
 namespace isohf::cli {
 
-/// Standard input, line by line, without its line ends ("\n" or "\r\n"), or in records of a fixed length.
+/// Standard input, line by line, without its line ends ("\n" or "\r\n").
 class LineReader {
  public:
   /// The next line; nullopt at the end. Calls `before_waiting` where the operating system has nothing more yet, so that
@@ -23,23 +22,11 @@ class LineReader {
     }
   }
 
-  /// The next record of so many bytes, valid until the next call; empty at the end. Throws Error{kCorrupt} where the
-  /// last one is cut short.
-  template <typename BeforeWaiting>
-  std::string_view next_record(std::size_t bytes, BeforeWaiting before_waiting) {
-    while (buffer_.size() - from_ < bytes && !at_end_) {
-      if (would_wait()) before_waiting();
-      read_more();
-    }
-    return take_record(bytes);
-  }
-
-  /// Of the line or record that came last, from 1.
+  /// Of the line that came last, from 1.
   [[nodiscard]] std::int64_t line_number() const { return line_number_; }
 
  private:
   std::optional<std::string> take_line();
-  std::string_view take_record(std::size_t bytes);
   [[nodiscard]] static bool would_wait();
   void read_more();
 

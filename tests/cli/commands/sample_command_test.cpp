@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -45,26 +44,20 @@ TEST_F(SampleCommand, ShadowsReachAsHighAsTheEdgeTowardsTheSunLetsThem) {
   const double surface = 1000.0 + kSlopeX * 1000.0 + kSlopeZ * 1000.0;
   const double edge = surface + kSlopeX * 990.0 - 990.0 * std::tan(8.0 * 0.017453292519943295);
   const std::vector<std::string> sun = {"sample",   archive,     "--at", "1000",       "1000",
-                                        "--shadow", "--azimuth", "E",    "--altitude", "8"};
+                                        "--shadow", "--azimuth", "E",    "--sun-elevation", "8"};
   const auto with = [&](const std::vector<std::string>& more) {
     std::vector<std::string> arguments = sun;
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_isohf(arguments);
   };
   double numbers[8] = {};
-  std::istringstream text(with({"--shadow-softness", "4"}).out);
+  std::istringstream text(with({}).out);
   for (double& number : numbers) text >> number;
   EXPECT_NEAR(numbers[0], surface, 1e-3);
   EXPECT_NEAR(numbers[6], edge, kSlopeX * 3.0 * kSpacing);  // the surface is level from a lattice step before the edge
   EXPECT_EQ(numbers[7], 0.0);
   const double above = numbers[6] - numbers[0];
-  for (const auto& [height, share] :
-       {std::pair{above - 1.0, 0.25}, {above, 0.5}, {above + 1.0, 0.75}, {above + 3.0, 1.0}}) {
-    const json line = json::parse(with({"--shadow-softness", "4", "--json", "--above", std::to_string(height)}).out);
-    EXPECT_NEAR(line.at("shadow").at("sun_share").get<double>(), share, 1e-5);
-    EXPECT_NEAR(line.at("shadow").at("elevation").get<double>(), numbers[6], 1e-5);
-  }
-  // Without a softness as much is seen as of the sun's disc stands above the edge.
+  // As much is seen as of the sun's disc stands above the edge.
   constexpr double kDegree = 0.017453292519943295;
   for (const double higher_deg : {-0.4, -0.2, 0.0, 0.1, 0.4}) {
     const double height = above + 990.0 * (std::tan(8.0 * kDegree) - std::tan((8.0 + higher_deg) * kDegree));
@@ -73,15 +66,6 @@ TEST_F(SampleCommand, ShadowsReachAsHighAsTheEdgeTowardsTheSunLetsThem) {
                 std::clamp(0.5 - higher_deg / (2.0 * 959.63 / 3600.0), 0.0, 1.0), 0.02)
         << higher_deg;
   }
-  RunOptions place;
-  const double at[] = {1000.0, 1000.0};
-  place.input.assign(reinterpret_cast<const char*>(at), sizeof(at));
-  const std::string record =
-      run_isohf({"sample", archive, "--binary", "--shadow", "--azimuth", "90", "--sun-elevation", "8"}, place).out;
-  ASSERT_EQ(record.size(), 48U);
-  double shadow = 0.0;
-  std::memcpy(&shadow, record.data() + 32, sizeof(shadow));
-  EXPECT_NEAR(shadow, numbers[6], 1e-5);
   EXPECT_EQ(run_isohf({"sample", archive, "--at", "50", "50", "--shadow"}).out, "void\n");
 }
 
@@ -96,7 +80,7 @@ TEST_F(SampleCommand, RefusesASunThatCastsNoShadow) {
   using testing::HasSubstr;
   EXPECT_THAT(refused({"--above", "3"}), HasSubstr("--above is for --shadow, which is not given"));
   EXPECT_THAT(refused({"--shadow", "--above", "-3"}), HasSubstr("must be 0 or more"));
-  EXPECT_THAT(refused({"--shadow", "--altitude", "90"}), HasSubstr("the sun must stand above 0 and below 90 degrees"));
+  EXPECT_THAT(refused({"--shadow", "--sun-elevation", "90"}), HasSubstr("the sun must stand above 0 and below 90 degrees"));
   EXPECT_THAT(refused({"--shadow", "--azimuth", "NW"}), HasSubstr("must be degrees from 0 to 360, or N, E, S, W"));
 }
 
@@ -114,7 +98,7 @@ TEST_F(SampleCommand, PlaneComesBackEverywhere) {
     line << places.back().first << (i % 2 == 0 ? " " : ",") << places.back().second << "\n";
     input.input += line.str();
   }
-  const RunResult result = run_isohf({"sample", folder / "plane.isohf", "--memory", "100K"}, input);
+  const RunResult result = run_isohf({"sample", folder / "plane.isohf"}, input);
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.err, "");
   std::istringstream lines(result.out);
@@ -197,69 +181,6 @@ TEST_F(SampleCommand, PlacesTakeACommaAsWellAsABlank) {
     EXPECT_EQ(result.out, apart.out);
   }
   EXPECT_EQ(run_isohf({"sample", folder / "plane.isohf", "--at", "1,2,3"}).exit_code, 2);
-}
-
-TEST_F(SampleCommand, BinaryRecordsHoldWhatTheLinesSay) {
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> x_of(-100.0, 2300.0);
-  std::uniform_real_distribution<double> z_of(-100.0, 1700.0);
-  RunOptions lines;
-  RunOptions records;
-  for (int i = 0; i < 5000; ++i) {
-    const double place[2] = {x_of(random), z_of(random)};
-    records.input.append(reinterpret_cast<const char*>(place), sizeof place);
-    std::ostringstream line;
-    line.precision(17);
-    line << place[0] << " " << place[1] << "\n";
-    lines.input += line.str();
-  }
-  const RunResult text = run_isohf({"sample", folder / "plane.isohf"}, lines);
-  const RunResult binary = run_isohf({"sample", folder / "plane.isohf", "--binary", "-j", "3"}, records);
-  ASSERT_EQ(binary.exit_code, 0) << binary.err;
-  ASSERT_EQ(binary.out.size(), 5000U * 32U);
-  std::istringstream stream(text.out);
-  const char* record = binary.out.data();
-  for (std::string line; std::getline(stream, line); record += 32) {
-    double elevation = 0.0;
-    float normal[3] = {};
-    std::uint32_t state = 9;
-    std::int32_t tile[2] = {};
-    std::memcpy(&elevation, record, 8);
-    std::memcpy(normal, record + 8, 12);
-    std::memcpy(&state, record + 20, 4);
-    std::memcpy(tile, record + 24, 8);
-    if (state == 0) {
-      std::istringstream words(line);
-      double wanted[4] = {};
-      int wanted_tile[2] = {};
-      ASSERT_TRUE(words >> wanted[0] >> wanted[1] >> wanted[2] >> wanted[3] >> wanted_tile[0] >> wanted_tile[1])
-          << line;
-      EXPECT_NEAR(elevation, wanted[0], 1e-5);
-      for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(double{normal[i]}, wanted[i + 1], 1e-6);
-      EXPECT_EQ(tile[0], wanted_tile[0]);
-      EXPECT_EQ(tile[1], wanted_tile[1]);
-      continue;
-    }
-    EXPECT_EQ(line, state == 1 ? "void" : "outside");
-    EXPECT_TRUE(std::isnan(elevation));
-    EXPECT_EQ(normal[1], 0.0F);
-    EXPECT_EQ(tile[0] < 0, state == 2);
-  }
-}
-
-TEST_F(SampleCommand, ABadRecordIsNamedAfterTheAnswersBeforeIt) {
-  const double places[4] = {1000.0, 1000.0, std::numeric_limits<double>::quiet_NaN(), 0.0};
-  RunOptions input;
-  input.input.assign(reinterpret_cast<const char*>(places), sizeof places);
-  const RunResult not_a_number = run_isohf({"sample", folder / "plane.isohf", "--binary"}, input);
-  EXPECT_EQ(not_a_number.exit_code, 1);
-  EXPECT_EQ(not_a_number.err, "isohf: standard input, record 2: found nan 0, must be two finite numbers\n");
-  EXPECT_EQ(not_a_number.out.size(), 32U);
-  input.input.resize(20);
-  const RunResult cut = run_isohf({"sample", folder / "plane.isohf", "--binary"}, input);
-  EXPECT_EQ(cut.exit_code, 1);
-  EXPECT_EQ(cut.err, "isohf: standard input, record 2: ends after 4 bytes, must have 16\n");
-  EXPECT_EQ(cut.out.size(), 32U);
 }
 
 TEST_F(SampleCommand, ALineIsAnsweredBeforeTheNextIsSent) {

@@ -1,7 +1,6 @@
-"""Elevations at random places: isohf sample beside gdallocationinfo, as lines and as records."""
+"""Elevations at random places: isohf sample beside gdallocationinfo."""
 
 import random
-import struct
 
 
 def measure(bench):
@@ -13,16 +12,14 @@ def measure(bench):
     bench.warm(archive)
     jobs = {}
     for count in counts:
-        lines, records = bench.work / f"places_{count}.txt", bench.work / f"places_{count}.bin"
+        lines = bench.work / f"places_{count}.txt"
         chance = random.Random(12)
         # Samples are posts one world unit apart: a place is the same to both programs.
         places = [(chance.uniform(0, side - 1), chance.uniform(0, side - 1)) for _ in range(count)]
-        records.write_bytes(struct.pack(f"<{2 * count}d", *(number for place in places for number in place)))
-        names = {f"isohf sample --binary, {count}": f"{bench.isohf} sample {archive} --binary < {records}"}
+        lines.write_text("".join(f"{x:.3f} {z:.3f}\n" for x, z in places))
+        names = {f"isohf sample, {count}": f"{bench.isohf} sample {archive} < {lines}"}
         if count == counts[0]:
-            lines.write_text("".join(f"{x:.3f} {z:.3f}\n" for x, z in places))
-            names = {f"isohf sample, {count}": f"{bench.isohf} sample {archive} < {lines}",
-                     f"isohf sample -j 1, {count}": f"{bench.isohf} sample {archive} -j 1 < {lines}", **names,
+            names = {**names, f"isohf sample -j 1, {count}": f"{bench.isohf} sample {archive} -j 1 < {lines}",
                      f"gdallocationinfo -valonly, {count}": f"gdallocationinfo -valonly {source} < {lines}"}
         for name, command in names.items():
             jobs[name] = ["bash", "-c", f"{command} > {bench.work / 'answers'}"]
