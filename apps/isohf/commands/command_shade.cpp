@@ -41,16 +41,16 @@ none. --hillshade is that of gdaldem, by Horn's formula: one band. Hillshades an
 there is no elevation.
 .tif has the georeference, .png a world file beside it. .exr holds light, or shares from 0 to 1.
 --date asks for the sun over the archive's middle, on Earth or Mars, at --time: mean solar time there, which is noon where the
-sun stands highest, but for a quarter of an hour. --hours draws a picture for each hour of sun, OUTPUT-06.png and so on.
+sun stands highest, but for a quarter of an hour.
 Memory is bounded whatever the archive's height: a row of its tiles twice, and about 64 MB; or by --memory.
 
 Examples:
   isohf shade dem.isohf -o dem.png
   isohf shade dem.isohf -o evening.png --sun-elevation 5 --azimuth 250 --size 4096x2300
-  isohf shade dem.isohf -o midsummer.png --date 2026-06-21 --hours
+  isohf shade dem.isohf -o midsummer.png --date 2026-06-21 --time 9:00
   isohf shade dem.isohf -o map.png --texture
   isohf shade dem.isohf -o hillshade.tif --hillshade
-  isohf shade dem.isohf -o shadows.tif --shadow-mask --azimuth 120 --altitude 8)";
+  isohf shade dem.isohf -o shadows.tif --shadow-mask --azimuth 120 --sun-elevation 8)";
 
 struct ShadeCommand {
   CommonOptions common;
@@ -58,15 +58,12 @@ struct ShadeCommand {
   std::string archive;
   std::string output;
   bool overwrite = false;
-  bool uncompressed = false;
   bool no_shadow = false;
   std::optional<std::int64_t> longest;  ///< pixels of the longer side
-  bool no_relief = false;
   std::optional<double> azimuth;
   std::optional<double> elevation;
   std::optional<SolarTime> date;
   double time = 12.0;
-  bool hours = false;
   ShadeOptions picture;
 };
 
@@ -88,7 +85,6 @@ std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
   line.positional("ARCHIVE", "Archive to draw", options.archive);
   line.positional("OUTPUT", "-o,--output", "Picture to write: .png, .tif or .exr", options.output);
   line.flag("--overwrite", "Replace OUTPUT where it exists", options.overwrite);
-  line.flag("--uncompressed", "TIFF, EXR: no compression", options.uncompressed);
   line.group("In place of a picture");
   bool asked = false;
   std::vector<std::string> kinds;
@@ -97,18 +93,16 @@ std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
     line.flag(kind.option, kind.help, asked, [&request, &kind] { request.kind = kind.kind; });
   }
   // What a kind has no use for.
-  for (const char* option : {"--no-relief", "--no-shadow", "--texture", "--palette"}) {
+  for (const char* option : {"--no-shadow", "--texture", "--palette"}) {
     std::vector<std::string> rivals = kinds;
     rivals.emplace_back(option);
     line.exclusive(rivals);
   }
-  line.exclusive({"--hillshade", "--shadow-softness"});
-  line.exclusive({"--no-shadow", "--shadow-softness"});
   line.group("Light");
   line.option("--azimuth", "DEG",
               "Where the sun stands, clockwise from North; N, E, S or W (default 270; --hillshade 315)",
               [&](const std::string& text) { options.azimuth = parse_azimuth(text); });
-  line.option("--altitude,--sun-elevation", "DEG",
+  line.option("--sun-elevation", "DEG",
               "Height of the sun above the horizon, 0.01 to 90 (default 15; --hillshade 45)",
               [&](const std::string& text) { options.elevation = parse_altitude(text); });
   line.option("--date", "YYYY-MM-DD", "The sun of that day over the archive's middle (Earth and Mars)",
@@ -118,18 +112,8 @@ std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
               });
   line.option("--time", "HH:MM", "With --date: mean solar time there (default 12:00)",
               [&](const std::string& text) { options.time = parse_time(text); });
-  line.flag("--hours", "With --date: a picture for each full hour that has sun, the hour before OUTPUT's ending",
-            options.hours);
   for (const char* option : {"--azimuth", "--sun-elevation"}) line.exclusive({"--date", option});
-  line.exclusive({"--time", "--hours"});
-  line.flag("--no-relief",
-            "Light all ground as if it were level; with --no-shadow nothing is lit, colours are what they are",
-            options.no_relief);
   line.flag("--no-shadow", "Leave out the shadows that land casts on land beyond it", options.no_shadow);
-  line.option("--shadow-softness", "K",
-              "One size of all penumbrae, vertical units (default: the sun's disc, whose penumbra grows with the "
-              "caster's distance)",
-              [&](const std::string& text) { request.softness = parse_positive_number(text); });
   line.group("Picture");
   line.option("--size", "N|WxH",
               "Pixels, of the longer side or both (default: one for each lattice step, at most 2048)",
@@ -138,7 +122,7 @@ std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
                 options.longest = is_side ? std::optional(parse_whole_number(text, 1, kMaxPixels)) : std::nullopt;
                 request.size = is_side ? std::nullopt : std::optional(parse_size(text, 1, kMaxPixels));
               });
-  line.option("--z-factor,--exaggeration", "F", "Draw heights F times as high (default 1)",
+  line.option("--exaggeration", "F", "Draw heights F times as high (default 1)",
               [&](const std::string& text) { request.exaggeration = parse_positive_number(text); });
   line.flag("--texture", "Show the archive's textures; where there is none, the palette's colours", request.texture);
   line.option("--palette", "NAME", "Colours of the ground: elevation, gray, mars (default: its body's)",
@@ -151,11 +135,8 @@ std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
   line.require("ARCHIVE", options.archive);
   line.require("OUTPUT", options.output);
   options.work.scratch_folder = scratch_folder_for(options.output);
-  for (const char* option : {"--time", "--hours"}) {
-    if (line.given(option) && !options.date) line.fail(std::string(option) + " needs --date");
-  }
+  if (line.given("--time") && !options.date) line.fail("--time needs --date");
   request.shadows = !options.no_shadow;
-  request.relief = !options.no_relief;
   const bool as_gdal = request.kind == ShadeKind::kHillshade;
   request.sun_azimuth_deg = options.azimuth.value_or(as_gdal ? 315.0 : 270.0);
   request.sun_elevation_deg = options.elevation.value_or(as_gdal ? 45.0 : 15.0);
@@ -176,55 +157,29 @@ std::optional<Georeference> georeference_of(const Metadata& metadata, const Grid
   return found;
 }
 
-/// A picture to draw, and where the sun stands.
-struct Frame {
-  std::string output;
-  double azimuth_deg;
-  double elevation_deg;
-  std::optional<double> hours;  ///< of the day, with --date
-};
-
-/// With the hour before the ending.
-std::string with_hour(const std::string& output, int hour) {
-  const std::filesystem::path path(output);
-  return (path.parent_path() / fmt::format("{}-{:02}{}", path.stem().string(), hour, path.extension().string()))
-      .string();
-}
-
-std::vector<Frame> frames_of(const ShadeCommand& options, ArchiveReader& archive) {
-  const ShadeOptions& request = options.picture;
-  if (!options.date) return {{options.output, request.sun_azimuth_deg, request.sun_elevation_deg, std::nullopt}};
+/// Where the sun of --date stands at --time. Throws Error{kInvalidArgument} if it is below the horizon.
+SunPlace sun_of_day(const ShadeCommand& options, ArchiveReader& archive) {
   try {
     understand_source(archive);
   } catch (const Error&) {
     // It may have degrees all the same; else DaySky says so.
   }
-  const DaySky sky(archive);
   SolarTime time = *options.date;
-  std::vector<Frame> frames;
-  const auto add = [&](double hours, const std::string& output) {
-    time.hours = hours;
-    const SunPlace sun = sky.sun(time);
-    if (sun.elevation_deg < kLowest_deg) return sun;
-    frames.push_back({output, sun.azimuth_deg, std::min(sun.elevation_deg, kHighest_deg), hours});
-    return sun;
-  };
-  if (options.hours) {
-    for (int hour = 0; hour < 24; ++hour) add(hour, with_hour(options.output, hour));
-    if (frames.empty()) throw Error(ErrorCode::kInvalidArgument, "--date: the sun does not rise on that day");
-    return frames;
+  time.hours = options.time;
+  SunPlace sun = DaySky(archive).sun(time);
+  if (sun.elevation_deg < kLowest_deg) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("--time: the sun stands {:.2g} degrees below the horizon then",
+                                                         std::max(0.0, -sun.elevation_deg)));
   }
-  const SunPlace sun = add(options.time, options.output);
-  if (!frames.empty()) return frames;
-  throw Error(ErrorCode::kInvalidArgument, fmt::format("--time: the sun stands {:.2g} degrees below the horizon then",
-                                                       std::max(0.0, -sun.elevation_deg)));
+  sun.elevation_deg = std::min(sun.elevation_deg, kHighest_deg);
+  return sun;
 }
 
 /// Heights without a unit, as fractions are, may be too small beside the ground for a slope to be seen.
 void tell_flat_relief(const Metadata& metadata, const ShadeOptions& request) {
   constexpr double kFlat = 0.01;
   constexpr double kHilly = 0.2;
-  const bool is_seen = request.relief && request.kind != ShadeKind::kShadowMask;
+  const bool is_seen = request.kind != ShadeKind::kShadowMask;
   const WorldBounds& ground = metadata.valid;
   const double range = metadata.statistics.max.value_or(0.0) - metadata.statistics.min.value_or(0.0);
   const double share = range / std::min(ground.x1 - ground.x0, ground.z1 - ground.z0);
@@ -239,7 +194,7 @@ void tell_flat_relief(const Metadata& metadata, const ShadeOptions& request) {
 int run(ShadeCommand options) {
   const auto start = std::chrono::steady_clock::now();
   const CommonOptions& common = options.common;
-  if (!options.date) check_raster_output({options.archive}, options.output, options.overwrite);
+  check_raster_output({options.archive}, options.output, options.overwrite);
   ArchiveReader archive = open_archive(options.archive);
   print_warnings(archive.warnings());
   const Metadata& metadata = archive.metadata();
@@ -264,53 +219,51 @@ int run(ShadeCommand options) {
   spec.sample_type = samples.type;
   spec.channels = samples.channels;
   spec.void_value = samples.void_value;
-  spec.compress = !options.uncompressed;
   spec.georeference = georeference_of(archive.metadata(), size);
   spec.overwrite = options.overwrite;
   spec.scratch = scratch_of(options.work);
 
-  const std::vector<Frame> frames = frames_of(options, archive);
-  for (const Frame& frame : frames) check_raster_output({options.archive}, frame.output, options.overwrite);
-  check_raster_room(options.output, spec, static_cast<std::int64_t>(frames.size()));
-  ShadeReport report;
-  ordered_json files = ordered_json::array();
-  ordered_json pictures = ordered_json::array();
-  std::string text;
-  for (const Frame& frame : frames) {
-    request.sun_azimuth_deg = frame.azimuth_deg;
-    request.sun_elevation_deg = frame.elevation_deg;
-    const auto sink = create_raster(frame.output, spec);
-    ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
-    report = shade_rows(
-        archive, request, [&](std::span<const std::byte> rows) { sink->write_rows(rows); },
-        job_from(options.work, display));
-    display.clear();
-    sink->finish();
-    for (const std::string& file : sink->files()) files.push_back(file);
-    if (!frame.hours) continue;
-    pictures.push_back({{"output", frame.output},
-                        {"hours", *frame.hours},
-                        {"azimuth_deg", frame.azimuth_deg},
-                        {"elevation_deg", frame.elevation_deg}});
-    text += fmt::format("sun          {}: {:02}:{:02.0f} solar time, azimuth {:.2f}, {:.2f} degrees high\n",
-                        frame.output, static_cast<int>(*frame.hours), (*frame.hours - std::floor(*frame.hours)) * 60.0,
-                        frame.azimuth_deg, frame.elevation_deg);
+  if (options.date) {
+    const SunPlace sun = sun_of_day(options, archive);
+    request.sun_azimuth_deg = sun.azimuth_deg;
+    request.sun_elevation_deg = sun.elevation_deg;
   }
+  check_raster_room(options.output, spec);
+  const auto sink = create_raster(options.output, spec);
+  ProgressDisplay display(options.work.progress, common.quiet, common.verbose);
+  const ShadeReport report = shade_rows(
+      archive, request, [&](std::span<const std::byte> rows) { sink->write_rows(rows); },
+      job_from(options.work, display));
+  display.clear();
+  sink->finish();
 
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const std::int64_t tiles = archive.metadata().plane_grid(report.plane).tile_count();
   StandardOutput out;
   if (common.json) {
-    ordered_json document{
-        {"archive", options.archive}, {"output", options.output}, {"files_written", files}, {"width", size.first},
-        {"height", size.second},      {"plane", report.plane},    {"tiles", tiles},         {"seconds", seconds}};
-    if (options.date) document["suns"] = pictures;
+    ordered_json document{{"archive", options.archive},
+                          {"output", options.output},
+                          {"files_written", sink->files()},
+                          {"width", size.first},
+                          {"height", size.second},
+                          {"plane", report.plane},
+                          {"tiles", tiles},
+                          {"seconds", seconds}};
+    if (options.date) {
+      document["sun"] = {{"hours", options.time},
+                         {"azimuth_deg", request.sun_azimuth_deg},
+                         {"elevation_deg", request.sun_elevation_deg}};
+    }
     out.write(json_text(document));
   } else if (!common.quiet) {
-    const std::string what = options.hours ? describe_count(static_cast<std::int64_t>(frames.size())) : options.output;
-    out.write(text + fmt::format("{:<13}{}: {} x {} pixels of {} tiles{} in {}\n",
-                                 options.hours ? "pictures" : "picture", what, size.first, size.second,
-                                 describe_count(tiles),
+    std::string text;
+    if (options.date) {
+      text = fmt::format("sun          {:02}:{:02.0f} solar time, azimuth {:.2f}, {:.2f} degrees high\n",
+                         static_cast<int>(options.time), (options.time - std::floor(options.time)) * 60.0,
+                         request.sun_azimuth_deg, request.sun_elevation_deg);
+    }
+    out.write(text + fmt::format("picture      {}: {} x {} pixels of {} tiles{} in {}\n", options.output, size.first,
+                                 size.second, describe_count(tiles),
                                  report.plane > 0 ? fmt::format(" of coarse plane {}", report.plane) : "",
                                  describe_seconds(seconds)));
   }

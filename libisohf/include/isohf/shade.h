@@ -81,7 +81,6 @@ struct ShadeOptions {
   double sun_azimuth_deg = 270.0;   ///< clockwise from the North of the archive's map
   double sun_elevation_deg = 15.0;  ///< above 0; below 90 where shadows are cast, else 90 at most
   bool shadows = true;              ///< of kPicture: that land casts on land beyond it
-  bool relief = true;               ///< of kPicture: shade slopes by how they face the sun
   double exaggeration = 1.0;        ///< of heights, > 0
   /// A penumbra of one size at all distances, elevation units, > 0 (k of paper Eq. 16); nullopt: that of the sun's disc as
   /// it is seen from the archive's body, which grows with the caster's distance.

@@ -153,7 +153,7 @@ TEST_F(ShadeCommand, HillshadesRankPixelsAsGdalDoes) {
                                      size,    "--hillshade"};
     for (const std::string& word : light) {
       const std::map<std::string, std::string> names = {
-          {"-az", "--azimuth"}, {"-alt", "--altitude"}, {"-z", "--z-factor"}};
+          {"-az", "--azimuth"}, {"-alt", "--sun-elevation"}, {"-z", "--exaggeration"}};
       ours.push_back(names.contains(word) ? names.at(word) : word);
     }
     const RunResult made = run_isohf(ours);
@@ -238,14 +238,15 @@ TEST_F(ShadeCommand, PalettesSuitTheBody) {
     spec.overwrite = true;
     write_raster(folder / "body.tif", spec, std::as_bytes(std::span(heights)));
     EXPECT_EQ(run_isohf({"convert", folder / "body.tif", folder / "b.isohf", "-q", "--overwrite"}).exit_code, 0);
-    std::vector<std::string> shade = {"shade",       folder / "b.isohf", folder / "b.tif", "--overwrite", "-q",
-                                      "--no-relief", "--no-shadow",      "--altitude",     "60"};
+    std::vector<std::string> shade = {
+        "shade", folder / "b.isohf", folder / "b.tif",  "--overwrite", "-q", "--exaggeration",
+        "0.001", "--no-shadow",      "--sun-elevation", "60"};
     shade.insert(shade.end(), more.begin(), more.end());
     EXPECT_EQ(run_isohf(shade).exit_code, 0);
     return read_channel(folder / "b.tif", "0").at(15, 5) - read_channel(folder / "b.tif", "2").at(15, 5);
   };
   EXPECT_GT(hue(3396190, {}), hue(1737400, {}) + 30) << "red over blue";
-  EXPECT_EQ(hue(3396190, {"--palette", "gray"}), hue(1737400, {}));
+  EXPECT_LT(hue(3396190, {"--palette", "gray"}), hue(3396190, {}) - 30);
 }
 
 TEST_F(ShadeCommand, TellsOfReliefThatCannotBeSeen) {
@@ -305,8 +306,9 @@ TEST_F(ShadeCommand, PixelsLieOnTheGroundThatTheyShow) {
     write_raster(folder / "ramp.tif", spec, std::as_bytes(std::span(heights)));
     EXPECT_EQ(run_isohf({"convert", folder / "ramp.tif", folder / "a.isohf", "--overwrite", "-q", "--fit"}).exit_code,
               0);
-    const RunResult shaded = run_isohf({"shade", folder / "a.isohf", folder / "a.tif", "--overwrite", "-q", "--palette",
-                                        "gray", "--no-relief", "--azimuth", rises_east ? "W" : "E", "--size", "12x12"});
+    const RunResult shaded =
+        run_isohf({"shade", folder / "a.isohf", folder / "a.tif", "--overwrite", "-q", "--palette", "gray",
+                   "--exaggeration", "0.001", "--azimuth", rises_east ? "W" : "E", "--size", "12x12"});
     EXPECT_EQ(shaded.exit_code, 0) << shaded.err;
     const Channel green = read_channel(folder / "a.tif", "1");
     EXPECT_NEAR(green.place.origin_x, 500005.0, 1e-6);
@@ -341,21 +343,18 @@ TEST_F(ShadeCommand, ASingleSizeIsTheLongerSide) {
               static_cast<double>(whole.width) / static_cast<double>(whole.height), 0.02);
 }
 
-TEST_F(ShadeCommand, DrawsEachHourOfADay) {
+TEST_F(ShadeCommand, TheSunOfADayIsThatOfThePlace) {
   std::string grid = "ncols 20\nnrows 20\nxllcorner 7\nyllcorner 46\ncellsize 0.001\n";
   for (int i = 0; i < 400; ++i) grid += std::to_string(i * 7 % 50) + ' ';
   write_file(folder / "alps.asc", grid);
   const RunResult converted =
       run_isohf({"convert", folder / "alps.asc", folder / "alps.isohf", "--crs", "EPSG:4326", "-q"});
   ASSERT_EQ(converted.exit_code, 0) << converted.err;
-  const RunResult day = run_isohf({"shade", folder / "alps.isohf", "-o", folder / "day.png", "--date", "2026-12-21",
-                                   "--hours", "--size", "20", "--json"});
+  const RunResult day = run_isohf(
+      {"shade", folder / "alps.isohf", "-o", folder / "day.png", "--date", "2026-12-21", "--size", "20", "--json"});
   ASSERT_EQ(day.exit_code, 0) << day.err;
-  const json suns = json::parse(day.out).at("suns");
-  ASSERT_EQ(suns.size(), 9U) << day.out;  // from 8 to 16 hours
-  EXPECT_EQ(suns[4].at("output"), folder / "day-12.png");
-  EXPECT_NEAR(suns[4].at("elevation_deg").get<double>(), 90.0 - 46.01 - 23.44, 0.02);
-  for (const json& sun : suns) EXPECT_GT(read_file(sun.at("output").get<std::string>()).size(), 100U);
+  EXPECT_NEAR(json::parse(day.out).at("sun").at("elevation_deg").get<double>(), 90.0 - 46.01 - 23.44, 0.02);
+  EXPECT_GT(read_file(folder / "day.png").size(), 100U);
   const RunResult night =
       run_isohf({"shade", folder / "alps.isohf", "-o", folder / "night.png", "--date", "2026-12-21", "--time", "3:00"});
   EXPECT_EQ(night.exit_code, 2);
@@ -378,24 +377,19 @@ TEST_F(ShadeCommand, RefusesWrongUsage) {
                                              {"--hillshade", "--shadow-mask"},
                                              {"--hillshade", "--texture"},
                                              {"--shadow-mask", "--no-shadow"},
-                                             {"--hillshade", "--shadow-softness", "1"},
                                              {"--shadow-mask", "--sun-elevation", "90"},
                                              {"--date", "2026-02-30"},
                                              {"--date", "21.6.2026"},
                                              {"--date", "2026-06-21", "--azimuth", "20"},
                                              {"--date", "2026-06-21", "--time", "25"},
                                              {"--date", "2026-06-21", "--time", "12:3"},
-                                             {"--date", "2026-06-21", "--time", "12:30", "--hours"},
                                              {"--date", "2026-06-21"},  // the archive has no place
                                              {"--time", "12:30"},
-                                             {"--hours"},
                                              {"--size", "0x5"},
                                              {"--size", "0"},
                                              {"--size", "5.5"},
                                              {"--exaggeration", "0"},
-                                             {"--palette", "blue"},
-                                             {"--shadow-softness", "-1"},
-                                             {"--no-shadow", "--shadow-softness", "1"}}) {
+                                             {"--palette", "blue"}}) {
     EXPECT_EQ(code(wrong), 2) << wrong[0];
   }
   EXPECT_EQ(run_isohf({"shade", folder / "a.isohf", folder / "a.tif"}).exit_code, 2);  // exists
@@ -425,14 +419,6 @@ TEST_F(ShadeCommand, TakesDegreesForTheMetresThatTheyAre) {
                   .exit_code,
               0);
     EXPECT_EQ(read_channel(folder / "m.tif", "").at(30, 30), 255) << projection;
-  }
-}
-
-TEST_F(ShadeCommand, UnlitGroundHasThePalettesOwnColours) {
-  const std::string picture = draw({"--palette", "gray", "--no-relief", "--no-shadow", "--size", "200x120"});
-  for (const char* channel : {"R", "G", "B"}) {
-    EXPECT_EQ(read_channel(picture, channel).at(150, 60), 150);
-    EXPECT_NEAR(read_channel(picture, channel).at(kWall, 60), 225, 15);
   }
 }
 

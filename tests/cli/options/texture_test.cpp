@@ -106,7 +106,7 @@ TEST_F(TextureOption, ShadeShowsThePhoto) {
   ASSERT_EQ(convert({"--texture", folder / "halves.ppm", "--texture-format", "png"}).exit_code, 0);
   for (const char* size : {"400x240", "90x54"}) {
     const RunResult result = run_isohf({"shade", folder / "a.isohf", "-o", folder / "s.tif", "--texture", "--no-shadow",
-                                        "--no-relief", "--size", size, "--overwrite"});
+                                        "--exaggeration", "0.001", "--size", size, "--overwrite"});
     ASSERT_EQ(result.exit_code, 0) << result.err;
     OpenOptions channel;
     const auto row_of = [&](const char* name) {

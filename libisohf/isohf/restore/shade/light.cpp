@@ -101,8 +101,8 @@ Light Palette::at(double elevation) const {
   return {blend(low.red, high.red), blend(low.green, high.green), blend(low.blue, high.blue)};
 }
 
-Illumination::Illumination(double sun_azimuth_deg, double sun_elevation_deg, bool relief, bool air)
-    : relief_(relief), towards_(towards_sun(sun_azimuth_deg, sun_elevation_deg)) {
+Illumination::Illumination(double sun_azimuth_deg, double sun_elevation_deg, bool air)
+    : towards_(towards_sun(sun_azimuth_deg, sun_elevation_deg)) {
   // A real sun near the horizon leaves flat ground dark. The exposure follows it, though not all the way, so that a
   // morning stays a morning: flat ground gets sin^0.35 of what a high sun gives it.
   const double exposure = 1.5 / std::pow(static_cast<double>(towards_.y), 0.65);
@@ -118,15 +118,14 @@ Illumination::Illumination(double sun_azimuth_deg, double sun_elevation_deg, boo
 }
 
 Light Illumination::on(const Normal& normal, float sun_share) const {
-  const float facing =
-      relief_ ? std::max(0.0F, normal.x * towards_.x + normal.y * towards_.y + normal.z * towards_.z) : towards_.y;
+  const float facing = std::max(0.0F, normal.x * towards_.x + normal.y * towards_.y + normal.z * towards_.z);
   // Light of the sky comes from everywhere, somewhat more of it from the North-West, as on hill-shaded maps, so that
   // land in the shadow keeps its shape.
   constexpr float kSkyX = -0.44F;
   constexpr float kSkyY = 0.78F;
   constexpr float kSkyZ = -0.44F;
   const float towards = normal.x * kSkyX + normal.y * kSkyY + normal.z * kSkyZ;
-  const float open = relief_ ? 0.3F + 0.9F * std::max(0.0F, towards) : 1.0F;
+  const float open = 0.3F + 0.9F * std::max(0.0F, towards);
   const float direct = facing * sun_share;
   Light light{};
   for (std::size_t k = 0; k < 3; ++k) light[k] = sun_[k] * direct + sky_[k] * open;

@@ -26,14 +26,13 @@ class Palette {
 /// Sun and sky over a landscape: how much light falls on a piece of ground, and what a picture shows of it.
 class Illumination {
  public:
-  /// relief  slopes are lit by how they face the sun; else all ground is level ground      air  has_air()
-  Illumination(double sun_azimuth_deg, double sun_elevation_deg, bool relief, bool air);
+  /// air  has_air()
+  Illumination(double sun_azimuth_deg, double sun_elevation_deg, bool air);
 
   /// Light that falls on ground with that normal where `sun_share` of the sun is seen.
   [[nodiscard]] Light on(const Normal& normal, float sun_share) const;
 
  private:
-  bool relief_;
   Normal towards_;
   Light sun_;
   Light sky_;

@@ -322,7 +322,7 @@ class ShadeRenderer {
         grid_(archive.metadata().plane_grid(plane_)),
         columns_(grid_, x_),
         palette_(shade_colours(archive.metadata(), request.palette)),
-        illumination_(request.sun_azimuth_deg, request.sun_elevation_deg, request.relief, has_air(archive.metadata())),
+        illumination_(request.sun_azimuth_deg, request.sun_elevation_deg, has_air(archive.metadata())),
         sun_(towards_sun(request.sun_azimuth_deg, request.sun_elevation_deg)),
         datum_(archive.metadata().statistics.min.value_or(0.0)),
         ground_(ground_scale(archive.metadata())),
@@ -765,7 +765,7 @@ class ShadeRenderer {
     const std::span<float> one(scratch.data(), count);
     switch (request_.kind) {
       case ShadeKind::kPicture:
-        if (request_.relief) relief_normals(rows, pixel, scratch);
+        relief_normals(rows, pixel, scratch);
         return colour_row(pixels, block, scratch, out);
       case ShadeKind::kHillshade:
         relief_hillshade(rows, pixel, sun_, one);
@@ -787,15 +787,13 @@ class ShadeRenderer {
   void colour_row(const PixelRow& pixels, const Run& block, const std::vector<float>& normals, std::byte* out) const {
     const auto points = static_cast<float>(points_in_pixel());
     const auto count = static_cast<std::size_t>(block.last - block.first);
-    const bool is_lit = request_.relief || request_.shadows;  // else colours are what they are
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t at = static_cast<std::size_t>(block.first) + i;
       const float height = pixels.heights[1 + at];
       if (std::isnan(height)) continue;
       const float alpha = pixels.cover.empty() ? 1.0F : pixels.cover[at] / points;
-      const Normal normal =
-          request_.relief ? Normal{normals[i], normals[count + i], normals[2 * count + i]} : Normal{0.0F, 1.0F, 0.0F};
-      Light light = is_lit ? illumination_.on(normal, sweep_ ? pixels.shares[at] : 1.0F) : Light{1.0F, 1.0F, 1.0F};
+      const Normal normal{normals[i], normals[count + i], normals[2 * count + i]};
+      Light light = illumination_.on(normal, sweep_ ? pixels.shares[at] : 1.0F);
       const Light ground = palette_.at(static_cast<double>(height) / world_per_elevation_ + datum_);
       for (std::size_t k = 0; k < 3; ++k) {
         const float colour =
@@ -809,7 +807,7 @@ class ShadeRenderer {
         continue;
       }
       auto* const to = reinterpret_cast<std::uint8_t*>(out) + 4 * i;
-      for (std::size_t k = 0; k < 3; ++k) to[k] = is_lit ? value_from_light(light[k]) : srgb_from_linear(light[k]);
+      for (std::size_t k = 0; k < 3; ++k) to[k] = value_from_light(light[k]);
       to[3] = static_cast<std::uint8_t>(alpha * 255.0F + 0.5F);
     }
   }
