@@ -33,8 +33,7 @@ Examples:
   isohf plan --levels 4 --triangles 10000
   isohf plan --shape 212x243
   isohf plan dem.tif --density 0.866
-  isohf plan tiles/                   what many rasters make together
-  isohf plan --table1                 the paper's Table 1 with true aspects)";
+  isohf plan tiles/                   what many rasters make together)";
 
 struct PlanOptions {
   CommonOptions common;
@@ -44,8 +43,6 @@ struct PlanOptions {
   PlanRequest request;
   GeoidRequest geoid;
   CodeType code_type = CodeType::kU16;
-  int limit = 10;
-  bool table1 = false;
   bool spacing_in_metres = false;
 };
 
@@ -60,9 +57,6 @@ std::optional<PlanOptions> parse_plan(const Arguments& arguments) {
   add_shape_options(line, options.request);
   line.group("Candidates");
   add_code_type_option(line, options.code_type);
-  line.option("--limit", "N", "List at most N candidates (default 10)",
-              [&](const std::string& text) { options.limit = static_cast<int>(parse_whole_number(text, 1, 1000000)); });
-  line.flag("--table1", "List the shapes of the paper's Table 1", options.table1);
   add_lattice_options(line, options.request, options.spacing_in_metres);
   add_ground_options(line, options.request.ground);
   add_geoid_option(line, options.geoid);
@@ -75,13 +69,6 @@ std::optional<PlanOptions> parse_plan(const Arguments& arguments) {
   if (options.inputs.names.empty()) {
     const std::string option = line.first_given({"Lattice", "Ground", "Input", "Several inputs"});
     if (!option.empty()) refuse(option + " needs an INPUT");
-  } else if (line.given("--limit")) {
-    refuse("--limit is for lists of candidates, without an INPUT");
-  }
-  if (options.table1) {
-    if (!options.inputs.names.empty()) refuse("--table1 takes no INPUT");
-    const std::string option = line.given("--limit") ? "--limit" : line.first_given({"Tile shape"});
-    if (!option.empty()) refuse("--table1 takes no " + option);
   }
   return options;
 }
@@ -119,40 +106,13 @@ ordered_json json_with_bytes(const TileShape& shape, CodeType type) {
   return json;
 }
 
-void list_table1(const PlanOptions& options) {
-  StandardOutput out;
-  ordered_json rows = ordered_json::array();
-  std::string text = std::string("Table 1 of the paper\n") + kTableHeading + "\n";
-  for (const Table1Row& row : table1()) {
-    const std::string why = TileShape::why_invalid(row.columns, row.rows, row.levels);
-    if (why.empty()) {
-      const TileShape shape = TileShape::make(row.columns, row.rows, row.levels);
-      text += table_row(shape, options.code_type) + "\n";
-      rows.push_back(json_with_bytes(shape, options.code_type));
-      rows.back()["valid"] = true;
-    } else {
-      const TileShape near = TileShape::nearest(row.columns, row.rows, row.levels);
-      text += fmt::format("{:>6} {:>6} {:>7} {:>8} {:>10.3f}  invalid: {}; the nearest valid shape is {}x{}\n",
-                          row.columns, row.rows, row.levels, "-", row.printed_aspect, why, near.columns(), near.rows());
-      rows.push_back({{"columns", row.columns},
-                      {"rows", row.rows},
-                      {"levels", row.levels},
-                      {"printed_aspect", row.printed_aspect},
-                      {"valid", false},
-                      {"why", why},
-                      {"nearest", json_with_bytes(near, options.code_type)}});
-    }
-  }
-  out.write(options.common.json ? json_text({{"table1", rows}}) : text + kTableNotes);
-  out.finish();
-}
-
 std::vector<TileShape> shapes_for(const PlanOptions& options) {
   constexpr int kDefaultLevels = 4;
+  constexpr int kMostCandidates = 10;
   const PlanRequest& request = options.request;
   const int levels = request.levels.value_or(kDefaultLevels);
   if (request.shape) return {TileShape::make(request.shape->first, request.shape->second, levels)};
-  std::vector<TileShape> shapes = candidate_shapes(request, options.limit);
+  std::vector<TileShape> shapes = candidate_shapes(request, kMostCandidates);
   if (shapes.empty()) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("plan: no tile shape of {} levels lies near {}; ask for more of them or for fewer --levels",
@@ -177,9 +137,7 @@ void list_candidates(const PlanOptions& options) {
 }
 
 int run(const PlanOptions& options) {
-  if (options.table1) {
-    list_table1(options);
-  } else if (options.inputs.names.empty()) {
+  if (options.inputs.names.empty()) {
     list_candidates(options);
   } else {
     SourceInputs inputs = options.inputs;

@@ -13,38 +13,12 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 
-TEST(PlanCommand, ListsTable1WithTheInvalidRowAndWhy) {
-  const RunResult text = run_isohf({"plan", "--table1"});
-  EXPECT_EQ(text.exit_code, 0);
-  EXPECT_EQ(text.err, "");
-  EXPECT_THAT(text.out, HasSubstr("invalid: (rows-3)/2 is 26, must be a multiple of 4 for 3 levels"));
-
-  const json rows = json::parse(run_isohf({"plan", "--table1", "--json"}).out).at("table1");
-  const std::vector<std::tuple<int, int, int, double>> printed = {
-      {1, 5, 5, 0.866},     {1, 24, 29, 1.046},   {1, 49, 57, 1.007},     {3, 12, 11, 0.794},
-      {3, 24, 27, 0.974},   {3, 48, 55, 0.992},   {4, 52, 67, 1.116},     {4, 68, 83, 1.057},
-      {4, 156, 179, 0.994}, {4, 212, 243, 0.993}, {10, 2564, 3075, 1.039}};
-  ASSERT_EQ(rows.size(), printed.size());
-  for (std::size_t i = 0; i < printed.size(); ++i) {
-    const auto& [levels, columns, rows_of_tile, aspect] = printed[i];
-    EXPECT_EQ(rows[i].at("levels"), levels);
-    EXPECT_EQ(rows[i].at("columns"), columns);
-    EXPECT_EQ(rows[i].at("rows"), rows_of_tile);
-    EXPECT_NEAR(rows[i].at("printed_aspect").get<double>(), aspect, 5.1e-4);  // printed to three places
-    EXPECT_EQ(rows[i].at("valid").get<bool>(), i != 5);
-    if (rows[i].at("valid").get<bool>()) {
-      EXPECT_EQ(rows[i].at("triangles").get<int>(), (2 * columns - 7) * (rows_of_tile - 3));
-      EXPECT_NEAR(rows[i].at("aspect").get<double>(), (rows_of_tile - 3) * std::sqrt(0.75) / (columns - 4), 1e-12);
-    }
-  }
-}
-
 TEST(PlanCommand, CandidatesLieNearTheBudgetBestAspectFirst) {
-  const RunResult result = run_isohf({"plan", "--levels", "4", "--triangles", "10000", "--limit", "5", "--json"});
+  const RunResult result = run_isohf({"plan", "--levels", "4", "--triangles", "10000", "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const json candidates = json::parse(result.out).at("candidates");
   ASSERT_FALSE(candidates.empty());
-  EXPECT_LE(candidates.size(), 5U);
+  EXPECT_LE(candidates.size(), 10U);
   double last = 0.0;
   for (const json& shape : candidates) {
     const double distortion = std::abs(shape.at("aspect").get<double>() - 1.0);

@@ -113,7 +113,6 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(0, "convert-each-line", {"convert", "--each", coast, "--out-dir", folder / "each", "--resume"});
 
   documents.run(0, "plan", {"plan"});
-  documents.run(0, "plan", {"plan", "--table1"});
   documents.run(0, "plan", {"plan", "--shape", "212x243"});
   documents.run(0, "plan", {"plan", coast});
   documents.run(0, "plan", {"plan", folder / "odd.asc"});
