@@ -337,12 +337,7 @@ int run(ConvertCommandOptions options) {
   // What the output is can be told before anything is looked for.
   if (!options.dry_run) check_archive_output(options.inputs.names, options.output, may_exist);
   std::vector<std::string> files = expand_inputs(options.inputs.names, options.inputs.recursive);
-  if (!options.dry_run) {
-    check_archive_output(files, options.output, may_exist);
-    if (options.report && *options.report != "-") {
-      check_report_output(files, *options.report, options.convert.overwrite);
-    }
-  }
+  if (!options.dry_run) check_archive_output(files, options.output, may_exist);
   const Prepared prepared = prepare(options, std::move(files));
   HeightSource& source = *prepared.source;
   std::optional<ProgressDisplay> display(std::in_place, options.work.progress, common.quiet, common.verbose);
@@ -360,18 +355,11 @@ int run(ConvertCommandOptions options) {
     out.finish();
     return kExitDone;
   }
-  const bool is_measured = options.report || options.convert.max_error;
   std::optional<ErrorEstimate> expected;
-  if (!common.quiet && (common.verbose || !is_measured)) expected = estimate_error(source, options.convert, job);
+  if (!common.quiet && (common.verbose || !options.convert.max_error))
+    expected = estimate_error(source, options.convert, job);
   if (common.verbose && !common.quiet) print_plan_notes(source, options.convert, job, expected);
-  if (is_measured) expected.reset();
-  std::optional<Accuracy> accuracy;
-  if (options.report) {
-    options.convert.measure = [&](const std::string& archive) {
-      accuracy = measure_accuracy(archive, source, job);
-      return accuracy->surface;
-    };
-  }
+  if (options.convert.max_error) expected.reset();  // it is measured
   if (const std::string note = note_of_dropped_part(options); !note.empty() && !common.quiet) print_note(note);
   const ConvertSummary summary = [&] {
     try {
@@ -384,17 +372,11 @@ int run(ConvertCommandOptions options) {
   display.reset();
   print_warnings(summary.warnings);
   const std::optional<VoidCounts> voids = counts_of_voids(source, summary.source_voids);
-  if (options.report && *options.report != "-") {
-    write_output(*options.report, json_text(json_from(*accuracy)), options.convert.overwrite);
-  }
   StandardOutput out;
   if (common.json) {
-    ordered_json document = document_of(options, summary, voids, expected);
-    if (options.report) document["report"] = json_from(*accuracy);
-    out.write(json_text(document));
+    out.write(json_text(document_of(options, summary, voids, expected)));
   } else if (!common.quiet) {
     out.write(text_from(options, summary, voids, expected));
-    if (options.report) out.write(text_from(*accuracy, options.input));
   }
   out.finish();
   return kExitDone;

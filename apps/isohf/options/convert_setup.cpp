@@ -90,7 +90,7 @@ void check_each_options(const CommandLine& line, const ConvertCommandOptions& op
   }
   if (!options.each.each) return;
   if (options.each.folder.empty()) refuse("--each needs --out-dir DIR, where the archives go");
-  for (const char* option : {"--output", "--dry-run", "--source-name", "--report", "--overlap", "--require-complete"}) {
+  for (const char* option : {"--output", "--dry-run", "--source-name", "--overlap", "--require-complete"}) {
     if (line.given(option)) refuse(fmt::format("{} is for one archive, --each makes many; leave one out", option));
   }
 }
@@ -188,11 +188,6 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
   line.group("Residuals");
   line.flag("--lossless", "Keep residuals as well, so that export gives INPUT's samples bit for bit",
             options.convert.lossless);
-  line.group("Report");
-  line.option_or_value(
-      "--report", "[FILE.json|-]", "-", [](const std::string& text) { return text == "-" || text.ends_with(".json"); },
-      "Measure the archive against INPUT afterwards; print it with the summary, and write it to FILE.json as well",
-      [&](const std::string& text) { options.report = text; });
   add_work_options(line, options.work);
   add_memory_option(line, options.work);
   add_common_options(line, options.common);

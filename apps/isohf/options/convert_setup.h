@@ -33,8 +33,6 @@ struct ConvertCommandOptions {
   bool dry_run = false;
   std::optional<ShardNumber> shard;
   EachOptions each;
-  /// Measure the archive against the input; the file for the report, "-" for none beside the summary.
-  std::optional<std::string> report;
 };
 
 /// nullopt: help was printed. Throws Error{kInvalidArgument}.

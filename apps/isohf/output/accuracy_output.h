@@ -9,7 +9,7 @@
 
 namespace isohf::cli {
 
-/// What convert --report and verify --against measure and print.
+/// What verify --against measures and prints.
 struct Accuracy {
   VertexReport vertices;
   AccuracyReport surface;

@@ -57,16 +57,4 @@ void check_raster_output(const std::vector<std::string>& inputs, const std::stri
   check_raster_target(output, overwrite);
 }
 
-void check_report_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite) {
-  constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
-  const std::string place = check_output_place(inputs, output);
-  const std::vector<std::byte> head = named(output, [&] { return head_of_file(place, kMostBytes); });
-  const auto* begin = reinterpret_cast<const char*>(head.data());
-  const auto json = nlohmann::json::parse(begin, begin + head.size(), nullptr, false);
-  if (!head.empty() && !(json.is_object() && json.contains("rms"))) {
-    refuse(output, "no report of isohf, which alone is replaced by one", "choose another name");
-  }
-  check_output_file(inputs, output, overwrite);
-}
-
 }  // namespace isohf::cli

@@ -12,7 +12,5 @@ namespace isohf::cli {
 void check_archive_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite);
 /// A raster, which with the files beside it replaces nothing but such.
 void check_raster_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite);
-/// A report, which replaces nothing but reports.
-void check_report_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite);
 
 }  // namespace isohf::cli

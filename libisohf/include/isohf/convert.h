@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -99,11 +98,8 @@ struct ConvertOptions {
   bool lossless = false;  ///< write residuals beside the tiles, so that the source's samples come back bit for bit
   /// Hold the surface, as drawn, to within that of every source sample that it has an elevation for. The smallest
   /// density that does is looked for, unless `plan` gives one; the step is chosen where none is asked for. Archives are
-  /// made and measured up to eight times. Throws Error{kInvalidArgument} with the smallest error that was reached.
+  /// made and measured up to eight times, and the metadata state what was found. Throws Error{kInvalidArgument} with the smallest error that was reached.
   std::optional<double> max_error;
-  /// Measures the archive once it is whole but for its name; the metadata then state what was found. nullopt:
-  /// compare_with_source() where max_error is given, else nothing.
-  std::function<AccuracyReport(const std::string& archive)> measure;
   std::string producer;  ///< for the record; empty: "isohf" and the library's version
   SourceNote source_note;
 };

@@ -22,8 +22,8 @@ struct ShardNumber {
 
 /// convert() of one shard, a work file that merge_shards() reads. Shards have about equally many rows of tiles, and end
 /// where rows of the first coarse plane do if there are enough of these. `lossless` reads all samples once more, for
-/// their hash. Throws as convert() does, and Error{kInvalidArgument} if there is no such shard, for `max_error` and
-/// `measure`, which need all rows at once, and for codes without `z_range`.
+/// their hash. Throws as convert() does, and Error{kInvalidArgument} if there is no such shard, for `max_error`,
+/// which needs all rows at once, and for codes without `z_range`.
 ConvertSummary convert_shard(HeightSource& source, const ShardNumber& shard, const std::string& output,
                              const ConvertOptions& options, const Job& job = {});
 

@@ -294,7 +294,6 @@ void check_statistics(const Conversion& conversion, const TileStatistics& all, b
 
 /// The accuracy of the archive as it will be, by the surface that a reader of it finds.
 AccuracyReport measure(const std::string& archive, const Conversion& conversion) {
-  if (conversion.options.measure) return conversion.options.measure(archive);
   ArchiveReader reader(archive);
   reader.set_source_map(conversion.options.plan.ground.source_map);
   reader.set_world_map(conversion.options.plan.ground.projection.system_map.map);
@@ -432,14 +431,14 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
     summary.tiles_expected = summary.tiles_written = conversion.end_tile - conversion.first_tile;
     summary.tiles_void = summary.tiles_written - writer.tiles_stored();
     summary.tile_bytes = writer.tile_bytes();
-    if (options.measure || options.max_error) {
+    if (options.max_error) {
       writer.complete(metadata);
       result.measured = measure(writer.part(), conversion);
       const AccuracyInfo found =
           info_of(*result.measured, options,
                   options.code_type == CodeType::kF32 ? all.worst_rounding
                                                       : metadata.rounding.value_or(0.5 * metadata.quantisation.scale));
-      result.is_finished = !options.max_error || found.max <= *options.max_error;
+      result.is_finished = found.max <= *options.max_error;
       if (result.is_finished) metadata.extensions.emplace_back(kAccuracyName, format_accuracy_info(found));
     }
     summary.archive_bytes = result.is_finished ? writer.finish(metadata) : writer.bytes_written();

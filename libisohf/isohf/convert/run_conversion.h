@@ -13,7 +13,7 @@ namespace isohf {
 /// What one conversion came to.
 struct ConversionResult {
   ConvertSummary summary;
-  std::optional<AccuracyReport> measured;  ///< by options.measure, or where there is a max_error
+  std::optional<AccuracyReport> measured;  ///< with a max_error
   bool is_finished = true;                 ///< false: the surface errs by more than max_error, nothing was left
 };
 

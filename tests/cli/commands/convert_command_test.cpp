@@ -186,35 +186,6 @@ TEST_F(ConvertCommand, MaxRoundingBoundsEveryVertex) {
   EXPECT_THAT(both.err, HasSubstr("--max-rounding"));
 }
 
-TEST_F(ConvertCommand, ReportIsWhatVerifyFindsAndLeavesTheElevationsAsTheyAre) {
-  convert("plain.isohf", {"--quiet"});
-  const json plain = json::parse(run_isohf({"info", folder / "plain.isohf", "--json"}).out);
-  convert("a.isohf", {"--quiet", "--report", folder / "r.json"});
-  const json made = json::parse(run_isohf({"info", folder / "a.isohf", "--json"}).out);
-  EXPECT_EQ(made.at("metadata").at("content_sha256"), plain.at("metadata").at("content_sha256"));
-  const json report = json::parse(read_file(folder / "r.json"));
-  const json verified =
-      json::parse(run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--json"}).out);
-  EXPECT_EQ(report, verified.at("against"));
-
-  // Without a file it stands alone, whatever follows; the output is no report.
-  const RunResult text = run_isohf({"convert", folder / "a.tif", "--report", folder / "b.isohf"});
-  EXPECT_EQ(text.exit_code, 0) << text.err;
-  EXPECT_THAT(text.out, testing::AllOf(HasSubstr("archive "), HasSubstr("\nerror ")));
-  const RunResult summary =
-      run_isohf({"convert", folder / "a.tif", folder / "b.isohf", "--overwrite", "--json", "--report", "-"});
-  EXPECT_EQ(json::parse(summary.out).at("report"), report);
-}
-
-TEST_F(ConvertCommand, AReportThatExistsIsRefusedBeforeConverting) {
-  write_file(folder / "r.json", R"({"rms": 1})");
-  const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--report", folder / "r.json"});
-  EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.err, HasSubstr("--overwrite"));
-  EXPECT_EQ(read_file(folder / "r.json"), R"({"rms": 1})");
-  EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.tif", "r.json"}));
-}
-
 TEST_F(ConvertCommand, MemoryThatRunsOutIsOneLine) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "AddressSanitizer needs more address space than this test leaves";

@@ -106,7 +106,7 @@ TEST_F(ExportAsSource, MoreThreadsThanCoresAreNoWordOnStandardError) {
        std::vector<std::vector<std::string>>{{"export", folder / "a.isohf", folder / "back.tif"},
                                              {"verify", folder / "a.isohf", "--against", kCoast},
                                              {"shade", folder / "a.isohf", "-o", folder / "back.png"},
-                                             {"convert", kCoast, folder / "b.isohf", "--report"}}) {
+                                             {"convert", kCoast, folder / "b.isohf"}}) {
     std::vector<std::string> arguments = command;
     arguments.insert(arguments.end(), {"-j", "300"});
     const RunResult result = run_isohf(arguments);

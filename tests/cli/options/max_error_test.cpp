@@ -133,15 +133,6 @@ TEST_F(MaxError, InfoPrintsWhatWasMeasuredAndVerifyFindsWhatIsNotTrue) {
   EXPECT_THAT(other.out, HasSubstr("ISOHF-0025 error: the metadata state an error of rms"));
 }
 
-TEST_F(MaxError, AReportIsKeptInTheMetadata) {
-  ASSERT_EQ(convert({"--report", "--quiet"}).exit_code, 0);
-  const json stated = json::parse(run_isohf({"info", folder / "a.isohf", "--json"}).out).at("metadata").at("accuracy");
-  EXPECT_EQ(stated.at("max"), against().at("max"));
-  EXPECT_TRUE(stated.at("max_error").is_null());
-  ASSERT_EQ(convert({"--quiet"}).exit_code, 0);
-  EXPECT_FALSE(json::parse(run_isohf({"info", folder / "a.isohf", "--json"}).out).at("metadata").contains("accuracy"));
-}
-
 TEST_F(MaxError, PlanAndSummaryExpectTheErrorToAFactorOfTwo) {
   for (const std::vector<std::string>& way : std::vector<std::vector<std::string>>{{}, {"--density", "0.3"}}) {
     std::vector<std::string> arguments = {"plan", folder / "a.tif", "--json"};

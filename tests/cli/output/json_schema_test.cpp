@@ -95,7 +95,7 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   write_text(folder / "bad.asc", "ncols 2\nnrows 2\ncellsize 1\n1 2 three 4\n");
   write_text(folder / "bad.isohf", "no archive");
 
-  documents.run(0, "convert", {"convert", coast, a, "--shadow-seeds", "--lossless", "--report", "--progress", "json"});
+  documents.run(0, "convert", {"convert", coast, a, "--shadow-seeds", "--lossless", "--progress", "json"});
   documents.run(0, "convert", {"convert", voids, b, "--fill", "--z-range", "0:1000", "--clamp-range"});
   documents.run(0, "convert", {"convert", peaks, folder / "c.isohf", "--type", "f32"});
   documents.run(0, "convert", {"convert", coast, a, "--shadow-seeds", "--lossless", "--resume"});
@@ -121,7 +121,7 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
 
   documents.run(0, "info", {"info", a, "--tiles"});
   documents.run(0, "info", {"info", b});
-  documents.run(0, "info", {"info", coast, "--stats", "--progress", "json"});
+  documents.run(0, "info", {"info", coast, "--stats"});
   documents.run(0, "info", {"info", peaks});
   documents.run(0, "info", {"info", folder / "odd.asc", "--stats"});
   documents.run(0, "info", {"info", d});
@@ -147,7 +147,8 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(0, "export", {"export", b, folder / "b.npy", "--size", "50x50", "--progress", "json"});
   documents.run(0, "export", {"export", d, folder / "d.tif", "--like", degrees});
   documents.run(2, "error", {"export", a, folder / "a.tif"});
-  documents.run(0, "export", {"export", a, folder / "t.r16", "--size", "40x40", "--tile-size", "20", "--progress", "json"});
+  documents.run(0, "export",
+                {"export", a, folder / "t.r16", "--size", "40x40", "--tile-size", "20", "--progress", "json"});
   documents.run(0, "export", {"export", a, folder / "t.asc", "--size", "30x20"});
   documents.run(2, "error", {"export", a, folder / "t.xyz"});
 

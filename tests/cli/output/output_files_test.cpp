@@ -91,16 +91,6 @@ TEST_F(OutputFiles, ADashIsRefusedBeforeTheWork) {
   for (const std::string command : {"export", "shade"}) {
     expect_refused({command, "a.isohf", "-o", "-"}, "-: standard output is not written to");
   }
-  EXPECT_THAT(run({"convert", "a.tif", "c.isohf", "--report", "-"}).out, HasSubstr("rms"));
-}
-
-TEST_F(OutputFiles, AReportReplacesOnlyReports) {
-  write_file(folder / "package.json", R"({"name": "mine"})");
-  expect_refused({"convert", "a.tif", "c.isohf", "--report", "package.json", "--overwrite"},
-                 "package.json: exists and is no report");
-  for (int time = 0; time < 2; ++time) {
-    run({"convert", "a.tif", "c.isohf", "--report", "report.json", "--overwrite", "-q"});
-  }
 }
 
 TEST_F(OutputFiles, LinksAreWrittenThrough) {

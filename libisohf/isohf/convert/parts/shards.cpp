@@ -59,10 +59,7 @@ std::string job_of(const SourceInfo& info, const Plan& plan, const ConvertOption
 /// Throws Error{kInvalidArgument} if no shard can know what it needs.
 void check_shard(const ConvertOptions& options, const ShardNumber& shard, std::size_t shards) {
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, why); };
-  for (const auto& [is_given, name] : {std::pair(options.max_error.has_value(), "`max_error`"),
-                                       std::pair(static_cast<bool>(options.measure), "measuring")}) {
-    if (is_given) refuse(fmt::format("{} needs all of the source at once; leave it out for a shard", name));
-  }
+  if (options.max_error) refuse("`max_error` needs all of the source at once; leave it out for a shard");
   if (!options.z_range && options.code_type != CodeType::kF32)
     refuse("a shard needs `z_range`, or `code_type` f32, as it does not see all elevations");
   if (shard.number < 1 || shard.number > shard.count)
