@@ -565,11 +565,10 @@ def restored(member, predicted, record):
 # ---- Shadow seeds and textures, sections 8 and 9 --------------------------------------------------------------------
 
 
-def shadow_seeds(payload, columns, rows, kind, angles, edges):
-    """Of both directions and each row the casters (distance, height), or of each angle the height of S, None for the edge's own;
-    heights as integers."""
-    require(struct.unpack_from("<BBBBHH", payload) == (1, angles > 0, kind, 0, rows - 2, angles), "a seed's header")
-    counts, at = struct.unpack_from("<%dI" % (1 if angles else 5), payload, 8), 8 + (4 if angles else 20)
+def shadow_seeds(payload, columns, rows, kind, edges):
+    """Of both directions and each row the casters (distance, height); heights as integers."""
+    require(struct.unpack_from("<BBBBHH", payload) == (1, 0, kind, 0, rows - 2, 0), "a seed's header")
+    counts, at = struct.unpack_from("<5I", payload, 8), 28
     (extra_bytes,), at, symbols = struct.unpack_from("<I", payload, at), at + 4, []
     for count in counts:
         symbols.append(iter(payload[at : at + count]))
@@ -583,14 +582,10 @@ def shadow_seeds(payload, columns, rows, kind, angles, edges):
     def wrapped(value):
         return (value + 2**31) % 2**32 - 2**31
 
-    found, rise = {}, 0
+    found = {}
     for direction in (0, 1):
-        for angle in range(angles):
-            for r in range(1, rows - 1):
-                rise = (rise + unzigzag(number(0))) % 2**32
-                found[direction, angle, r] = wrapped(edges[direction][r] + rise) if rise else None
         above = []
-        for r in range(1, rows - 1) if not angles else ():
+        for r in range(1, rows - 1):
             near = [((d + 1) // 2 if r % 2 else d // across * (columns - 3) + (d % across + 1) // 2, h) for d, h in above]
             n, h, p, above = 0, edges[direction][r], 0, []
             for _ in range(len(near) + unzigzag(number(0))):
@@ -843,8 +838,7 @@ class Archive:
     def check_seeds(self):
         """What seeds say enters each tile against what the tiles before it send."""
         info, columns, rows = self.metadata["shadow_seeds"], self.shape["columns"], self.shape["rows"]
-        suns = info["sun_deg"] if info["kind"] == "angles" else [info["sun_min_deg"] * (1 - k / 3) + 30 * k for k in range(3)]
-        angles = len(suns) if info["kind"] == "angles" else 0
+        suns = [info["sun_min_deg"] * (1 - k / 3) + 30 * k for k in range(3)]
         unit = self.metadata["extent"]["x"] / (2 * (columns - 4)) * info["elevation_units_per_world_unit"]
         falls = [math.tan(math.radians(sun)) * unit / (1 if self.kind == 2 else self.metadata["samples"]["scale"]) for sun in suns]
 
@@ -865,15 +859,13 @@ class Archive:
                 found = None
                 if name in self.members:
                     seen += direction
-                    found = shadow_seeds(self.member(name), columns, rows, self.kind, angles, edges)
+                    found = shadow_seeds(self.member(name), columns, rows, self.kind, edges)
                 for (k, r), s in entering.items():
                     edge = number(edges[direction][r])
                     stated = [edge]
-                    if found and angles and found[direction, k, r] is not None:
-                        stated.append(number(found[direction, k, r]))
-                    elif found and not angles:
+                    if found:
                         stated += [number(h) - d * falls[k] for d, h in found[direction, 0, r]]
-                    slack = (0.5 if angles and self.kind < 2 else 0) + 1e-6 * max(1, abs(s) if s > -math.inf else 0)
+                    slack = 1e-6 * max(1, abs(s) if s > -math.inf else 0)
                     if "tiles/%d/%d.tile" % (j, i) in self.members:
                         require(max(s, edge) == max(stated) or abs(max(s, edge) - max(stated)) <= slack,
                                 name + " is not what the tiles of its row send")

@@ -93,42 +93,6 @@ TEST(ShadowSeeds, HullsComeBackForAllTypesAndShapes) {
   }
 }
 
-TEST(ShadowSeeds, AnglesComeBackToTheNearestCode) {
-  for (const CodeType type : kAllTypes) {
-    for (unsigned seed = 0; seed < 50; ++seed) {
-      const Case c = random_case(type, seed);
-      std::mt19937 random(seed);
-      const auto rows = static_cast<std::size_t>(visible_rows(c.grid.shape()));
-      AngleSeeds seeds;
-      for (auto* direction : {&seeds.eastward, &seeds.westward}) {
-        for (std::size_t i = 0; i < 3 * rows; ++i) {
-          const double code = static_cast<double>(random() % 25400) / 100.0;
-          direction->push_back(random() % 3 == 0 ? kNone : type == CodeType::kF32 ? 2000.0 + code / 7 : code);
-        }
-      }
-      const AngleSeeds found = decode_angle_seeds(c.grid, c.edges, 3, inflate(encode_seeds(c.grid, c.edges, seeds, 3)));
-      const TileShape& shape = c.grid.shape();
-      for (std::size_t i = 0; i < 3 * rows; ++i) {
-        const int row = static_cast<int>(i % rows) + 1;
-        for (const bool east : {true, false}) {
-          const double wanted = (east ? seeds.eastward : seeds.westward)[i];
-          const double got = (east ? found.eastward : found.westward)[i];
-          const int column = east ? 1 : last_visible_column(shape, row);
-          const auto at = static_cast<std::size_t>(row * shape.columns() + column);
-          double edge = type == CodeType::kF32 ? double{c.tile.heights[at]} : c.tile.codes[at];
-          if (edge == (type == CodeType::kU8 ? 255 : 65535)) edge = NAN;
-          if (got == kNone) {
-            ASSERT_TRUE(wanted == kNone || wanted < edge + 0.5) << i;
-          } else {
-            // half a code; half of a float's last bit at 4000
-            ASSERT_NEAR(got, wanted, type == CodeType::kF32 ? 2e-4 : 0.5);
-          }
-        }
-      }
-    }
-  }
-}
-
 TEST(ShadowSeeds, EveryTruncationAndEveryByteTooManyIsRefused) {
   const Case c = random_case(CodeType::kU16, 17);
   ASSERT_FALSE(c.seeds.empty());
@@ -138,17 +102,6 @@ TEST(ShadowSeeds, EveryTruncationAndEveryByteTooManyIsRefused) {
   }
   payload.push_back({});
   EXPECT_THROW((void)decode_hull_seeds(c.grid, c.index, c.edges, payload), Error);
-
-  AngleSeeds seeds;
-  const auto rows = static_cast<std::size_t>(visible_rows(c.grid.shape()));
-  seeds.eastward.assign(rows, 60000.0);
-  seeds.westward.assign(rows, kNone);
-  payload = inflate(encode_seeds(c.grid, c.edges, seeds, 1));
-  for (std::size_t n = 0; n < payload.size(); ++n) {
-    EXPECT_THROW((void)decode_angle_seeds(c.grid, c.edges, 1, std::span(payload).first(n)), Error) << n;
-  }
-  payload.push_back({});
-  EXPECT_THROW((void)decode_angle_seeds(c.grid, c.edges, 1, payload), Error);
 }
 
 /// Whatever it decodes to must be possible in that place.
@@ -231,14 +184,10 @@ TEST(ShadowSeedInfo, ComesBackFromJson) {
   info.members = 5;
   info.bytes = 700;
   const ShadowSeedInfo hulls = parsed(format_shadow_seed_info(info));
-  EXPECT_EQ(hulls.kind, ShadowSeedInfo::Kind::kHulls);
   EXPECT_EQ(hulls.sun_min_deg, 1.5);
   EXPECT_EQ(hulls.elevation_units_per_world_unit, 3.28);
   EXPECT_EQ(hulls.members, 5);
   EXPECT_EQ(hulls.bytes, 700U);
-  info.kind = ShadowSeedInfo::Kind::kAngles;
-  info.sun_deg = {5, 15, 30};
-  EXPECT_EQ(parsed(format_shadow_seed_info(info)).sun_deg, info.sun_deg);
 }
 
 TEST(ShadowSeedInfo, RefusesWhatItIsNot) {
@@ -247,9 +196,8 @@ TEST(ShadowSeedInfo, RefusesWhatItIsNot) {
   for (const std::string& text : std::vector<std::string>{
            "", "[]", "{}", R"({"kind":"lines","sun_min_deg":2)" + rest, R"({"kind":"hulls")" + rest,
            R"({"kind":"hulls","sun_min_deg":0)" + rest, R"({"kind":"hulls","sun_min_deg":90)" + rest,
-           R"({"kind":"hulls","sun_min_deg":"2")" + rest, R"({"kind":"angles")" + rest,
-           R"({"kind":"angles","sun_deg":[])" + rest, R"({"kind":"angles","sun_deg":[5,5])" + rest,
-           R"({"kind":"angles","sun_deg":[5,"x"])" + rest, R"({"kind":"hulls","sun_min_deg":2})",
+           R"({"kind":"hulls","sun_min_deg":"2")" + rest, R"({"kind":"angles","sun_deg":[5])" + rest,
+           R"({"kind":"hulls","sun_min_deg":2})",
            R"({"kind":"hulls","sun_min_deg":2,"elevation_units_per_world_unit":0,"members":1,"bytes":1})",
            R"({"kind":"hulls","sun_min_deg":2,"elevation_units_per_world_unit":1,"members":-1,"bytes":1})"}) {
     EXPECT_THROW((void)parsed(text), Error) << text;

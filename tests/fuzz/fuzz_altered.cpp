@@ -26,7 +26,7 @@ const std::vector<AlteredArchive>& archives() {
   static const std::vector<AlteredArchive> all = [] {
     std::vector<AlteredArchive> read;
     for (const char* name : {"u16-small-tiles", "u16-lossless-voids", "projected-lossless", "seeds-hulls",
-                             "seeds-angles", "f32-voids", "u8-coarse-lossless", "textures-png", "textures-jpeg"}) {
+                             "seeds-hulls-voids", "f32-voids", "u8-coarse-lossless", "textures-png", "textures-jpeg"}) {
       read.emplace_back(std::string(ISOHF_SOURCE_DIR "/testdata/conformance/good/") + name + ".isohf");
     }
     return read;

@@ -146,8 +146,7 @@ class Soak : public ::testing::Test {
       }
     }
     if (chance(0.25)) {
-      options.shadow_seeds = ShadowSeedRequest{between(2.0, 30.0), {}};
-      if (chance(0.5)) options.shadow_seeds->sun_deg = {5.0, 30.0};
+      options.shadow_seeds = ShadowSeedRequest{between(2.0, 30.0)};
     }
     options.effort = static_cast<Effort>(whole(0, 2));
     options.planes = chance(0.7);

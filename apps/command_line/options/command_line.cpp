@@ -36,8 +36,6 @@ struct Option {
   std::size_t values = 1;  ///< 0: a flag
   bool repeats = false;
   std::vector<std::string> words{};
-  std::optional<std::string> alone{};  ///< what it means without a value, if it may stand so
-  std::function<bool(const std::string&)> is_value = nullptr;
   std::function<void(const Values&)> take = nullptr;  ///< the values of one occurrence
   std::vector<Occurrence> found{};
   Origin origin = Origin::kNowhere;
@@ -49,10 +47,6 @@ struct Option {
   [[nodiscard]] bool is_set() const { return !found.empty() && (values > 0 || found.back().values.front() == "true"); }
   [[nodiscard]] bool takes_list() const { return value_name.find(',') != std::string::npos; }
 };
-
-bool is_numbers(const std::string& text) {
-  return !text.empty() && text.find_first_not_of("0123456789.,") == std::string::npos;
-}
 
 [[noreturn]] void refuse(const std::string& why) {
   throw Error(ErrorCode::kInvalidArgument, why);
@@ -106,10 +100,7 @@ std::vector<Values> values_from(const Option& option, const ConfigValue& value) 
     if (value.kind != Kind::kBoolean) mismatch("true or false");
     return {{value.text}};
   }
-  if (value.kind == Kind::kBoolean) {
-    if (!option.alone) mismatch(option.value_name);
-    return value.text == "true" ? std::vector<Values>{{*option.alone}} : std::vector<Values>{};
-  }
+  if (value.kind == Kind::kBoolean) mismatch(option.value_name);
   if (option.values > 1) {
     const std::string required = fmt::format("an array of {} values, or an array of such arrays", option.values);
     if (value.kind != Kind::kArray) mismatch(required);
@@ -268,20 +259,16 @@ std::size_t CommandLine::State::place_values(Option& option, const Arguments& ar
   Values values;
   if (option.values == 0) values = {"true"};
   const auto is_there = [&](std::size_t i) { return i < arguments.size() && can_be_value(arguments[i]); };
-  if (option.alone && !(is_there(next) && option.is_value(arguments[next]))) {
-    values = {*option.alone};
-  } else {
-    for (; values.size() < option.values; ++next) {
-      if (is_there(next)) {
-        // "1,2" and "1, 2" are two values as well.
-        const std::size_t comma = option.values == 2 && values.empty() ? arguments[next].find(',') : std::string::npos;
-        values.push_back(arguments[next].substr(0, comma));
-        if (comma < arguments[next].size() - 1) values.push_back(arguments[next].substr(comma + 1));
-      } else if (option.values == 1) {
-        refuse_usage(fmt::format("{} lacks its value", option.name()));
-      } else {
-        refuse_usage(fmt::format("{0} takes {1} values: {0} {2}", option.name(), option.values, option.value_name));
-      }
+  for (; values.size() < option.values; ++next) {
+    if (is_there(next)) {
+      // "1,2" and "1, 2" are two values as well.
+      const std::size_t comma = option.values == 2 && values.empty() ? arguments[next].find(',') : std::string::npos;
+      values.push_back(arguments[next].substr(0, comma));
+      if (comma < arguments[next].size() - 1) values.push_back(arguments[next].substr(comma + 1));
+    } else if (option.values == 1) {
+      refuse_usage(fmt::format("{} lacks its value", option.name()));
+    } else {
+      refuse_usage(fmt::format("{0} takes {1} values: {0} {2}", option.name(), option.values, option.value_name));
     }
   }
   option.found.push_back({option.name(), std::move(values)});
@@ -454,19 +441,6 @@ void CommandLine::option(const std::string& flags, const std::string& value_name
 void CommandLine::option(const std::string& flags, const std::string& value_name, const std::string& description,
                          std::string& value) {
   option(flags, value_name, description, [&value](const std::string& text) { value = text; });
-}
-
-void CommandLine::option_or_numbers(const std::string& flag, const std::string& value_name, const std::string& alone,
-                                    const std::string& description, Take take) {
-  option_or_value(flag, value_name, alone, is_numbers, description, std::move(take));
-}
-
-void CommandLine::option_or_value(const std::string& flag, const std::string& value_name, const std::string& alone,
-                                  std::function<bool(const std::string&)> is_value, const std::string& description,
-                                  Take take) {
-  option(flag, value_name, description, std::move(take));
-  state_->options.back().alone = alone;
-  state_->options.back().is_value = std::move(is_value);
 }
 
 void CommandLine::repeated(const std::string& flags, const std::string& value_name, const std::string& description,

@@ -47,13 +47,6 @@ class CommandLine {
   void option(const std::string& flags, const std::string& value_name, const std::string& description, Take take);
   void option(const std::string& flags, const std::string& value_name, const std::string& description,
               std::string& value);
-  /// An option that may stand without a value, which counts as `alone`. What follows it is its value where it holds
-  /// nothing but digits, dots and commas; anything else is the next argument.
-  void option_or_numbers(const std::string& flag, const std::string& value_name, const std::string& alone,
-                         const std::string& description, Take take);
-  /// The same where the next argument is its value if `is_value` says so.
-  void option_or_value(const std::string& flag, const std::string& value_name, const std::string& alone,
-                       std::function<bool(const std::string&)> is_value, const std::string& description, Take take);
   /// An option that may be given again and again; values are appended.
   void repeated(const std::string& flags, const std::string& value_name, const std::string& description,
                 std::vector<std::string>& values);

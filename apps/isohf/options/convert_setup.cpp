@@ -109,7 +109,7 @@ void check_shard_options(const CommandLine& line, const ConvertCommandOptions& o
   const auto refuse = [](const std::string& why) {
     throw Error(ErrorCode::kInvalidArgument, {"convert", why, "", ""});
   };
-  for (const char* option : {"--each", "--dry-run", "--resume", "--max-error", "--report"}) {
+  for (const char* option : {"--each", "--dry-run", "--resume", "--max-error"}) {
     if (line.given(option)) refuse(fmt::format("{} has no place with --shard", option));
   }
   if (!options.convert.z_range && options.convert.code_type != CodeType::kF32) {
@@ -174,14 +174,12 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
   line.words({"fast", "default", "best"});
   line.flag("--no-planes", "Leave out the coarse planes, by which the archive is looked at from afar", no_planes);
   line.group("Shadows");
-  line.option_or_numbers(
-      "--shadow-seeds", "[DEG,...]", "all",
-      "Store the shadows that tiles cast over their neighbours, so that none needs another: for every sun elevation "
-      "from --sun-min on, or for the given ones, as in 5,15,30",
-      [&](const std::string& text) {
-        options.convert.shadow_seeds.emplace();
-        if (text != "all") options.convert.shadow_seeds->sun_deg = parse_numbers(text);
-      });
+  bool shadow_seeds = false;
+  line.flag(
+      "--shadow-seeds",
+      "Store the shadows that tiles cast over their neighbours, so that none needs another, for every sun elevation "
+      "from --sun-min on",
+      shadow_seeds, [&] { options.convert.shadow_seeds.emplace(); });
   line.option("--sun-min", "DEG", "Lowest sun elevation for --shadow-seeds (default 2); a lower one takes more room",
               [&](const std::string& text) { sun_min_deg = parse_number(text); });
   add_texture_options(line, options.texture);
@@ -206,8 +204,8 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
                 "convert: --dry-run cannot tell what --max-error will choose; leave one of the two out");
   }
   if (sun_min_deg) {
-    if (!options.convert.shadow_seeds || !options.convert.shadow_seeds->sun_deg.empty()) {
-      throw Error(ErrorCode::kInvalidArgument, "convert: --sun-min needs --shadow-seeds without angles");
+    if (!options.convert.shadow_seeds) {
+      throw Error(ErrorCode::kInvalidArgument, "convert: --sun-min needs --shadow-seeds");
     }
     options.convert.shadow_seeds->sun_min_deg = *sun_min_deg;
   }

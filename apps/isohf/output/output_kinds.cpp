@@ -1,7 +1,5 @@
 #include "output/output_kinds.h"
 
-#include <nlohmann/json.hpp>
-
 #include "formats/registry.h"
 #include "formats/write/encoders.h"
 #include "formats/write/raster_sink.h"

@@ -52,8 +52,7 @@ struct PlanRequest {
 
 /// Which shadow seeds an archive gets (docs/archive_format.md).
 struct ShadowSeedRequest {
-  double sun_min_deg = 2.0;     ///< hulls for every sun elevation from here on, degrees, 0.01 to below 90
-  std::vector<double> sun_deg;  ///< instead: shadow heights for these sun elevations, ascending
+  double sun_min_deg = 2.0;  ///< they serve every sun elevation from here on, degrees, 0.01 to below 90
 };
 
 /// Which textures an archive gets (docs/decisions/0015).

@@ -120,9 +120,7 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
                              : "auto",
       options.clamp_range, to_string(options.filter.value_or(kDefaultFilter)), to_string(options.acquisition),
       level_of(options.effort),
-      options.shadow_seeds
-          ? fmt::format("{} [{}]", options.shadow_seeds->sun_min_deg, fmt::join(options.shadow_seeds->sun_deg, " "))
-          : "none");
+      options.shadow_seeds ? fmt::format("{} []", options.shadow_seeds->sun_min_deg) : "none");
 }
 
 /// of_files: with sizes and times of the files, and the program's version.

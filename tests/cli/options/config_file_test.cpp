@@ -69,8 +69,7 @@ TEST_F(ConfigFile, CommandLineGoesBeforeSectionsAndThoseBeforeTheTopLevel) {
 TEST_F(ConfigFile, ArraysServeListsPairsAndOptionsThatRepeat) {
   const std::string archive = folder_ / "a.isohf";
   ASSERT_EQ(
-      run("[convert]\nnodata = [-9999, -32768]\nshadow-seeds = [5, 15]\nquiet = true\n", {"convert", coast_, archive})
-          .err,
+      run("[convert]\nnodata = [-9999, -32768]\nshadow-seeds = true\nquiet = true\n", {"convert", coast_, archive}).err,
       "");
   EXPECT_EQ(out_of("[sample]\nat = [[1000, 2000.5], [3000, 1]]\n", {"sample", archive}),
             run_isohf({"sample", archive, "--at", "1000", "2000.5", "--at", "3000", "1"}).out);
@@ -79,7 +78,7 @@ TEST_F(ConfigFile, ArraysServeListsPairsAndOptionsThatRepeat) {
   EXPECT_EQ(run("[verify]\nagainst = ['" + coast_ + "']\nmax-rms = 1e9\n", {"verify", archive}).exit_code, 0);
 }
 
-TEST_F(ConfigFile, BooleansServeFlagsAndOptionsThatMayStandAlone) {
+TEST_F(ConfigFile, BooleansServeFlags) {
   const RunResult result = run("shadow-seeds = true\nquiet = true\n", {"convert", coast_, folder_ / "a.isohf"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(run_isohf({"info", folder_ / "a.isohf", "--json"}).out, HasSubstr("shadow"));

@@ -1,7 +1,6 @@
 #include "isohf/archive/shadow_seeds/shadow_seed_reader.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -31,10 +30,7 @@ ShadowSeedInfo info_of(const ArchiveReader& archive) {
 ShadowSeedReader::ShadowSeedReader(const ArchiveReader& archive) : archive_(archive), info_(info_of(archive)) {}
 
 bool ShadowSeedReader::covers(double sun_elevation_deg) const {
-  if (!(sun_elevation_deg > 0.0 && sun_elevation_deg < 90.0)) return false;
-  if (info_.kind == ShadowSeedInfo::Kind::kHulls) return sun_elevation_deg >= info_.sun_min_deg - kSameAngleDeg;
-  return std::any_of(info_.sun_deg.begin(), info_.sun_deg.end(),
-                     [&](double angle) { return std::abs(angle - sun_elevation_deg) <= kSameAngleDeg; });
+  return sun_elevation_deg > 0.0 && sun_elevation_deg < 90.0 && sun_elevation_deg >= info_.sun_min_deg - kSameAngleDeg;
 }
 
 std::vector<std::byte> ShadowSeedReader::payload(TileIndex index) const {
@@ -55,9 +51,6 @@ std::vector<std::byte> ShadowSeedReader::payload(TileIndex index) const {
 }
 
 HullSeeds ShadowSeedReader::hulls(TileIndex index, const TileCodes& tile) const {
-  if (info_.kind != ShadowSeedInfo::Kind::kHulls) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: its seeds are for certain angles", archive_.path()));
-  }
   const std::vector<std::byte> bytes = payload(index);
   if (bytes.empty()) {
     CasterRows none;
@@ -75,35 +68,19 @@ std::vector<double> ShadowSeedReader::entering(TileIndex index, const TileCodes&
                                                double sun_elevation_deg) const {
   if (!covers(sun_elevation_deg)) {
     throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: has shadow seeds for {}, not for a sun elevation of {} degrees", archive_.path(),
-                            info_.kind == ShadowSeedInfo::Kind::kHulls
-                                ? fmt::format("{} degrees and more", info_.sun_min_deg)
-                                : fmt::format("{} degrees", fmt::join(info_.sun_deg, ", ")),
-                            sun_elevation_deg));
+                fmt::format("{}: has shadow seeds for {} degrees and more, not for a sun elevation of {} degrees",
+                            archive_.path(), info_.sun_min_deg, sun_elevation_deg));
   }
   const TileGrid& grid = archive_.grid();
   const Quantisation& quantisation = archive_.metadata().quantisation;
   const auto rows = static_cast<std::size_t>(visible_rows(grid.shape()));
   std::vector<double> heights(rows, kNoHeight);
-  if (info_.kind == ShadowSeedInfo::Kind::kHulls) {
-    const double fall = info_.fall_per_half_step(grid, quantisation, sun_elevation_deg);
-    const HullSeeds seeds = hulls(index, tile);
-    const CasterRows& casters = travel == LightTravel::kEastward ? seeds.eastward : seeds.westward;
-    for (std::size_t row = 0; row < rows; ++row) {
-      for (const ShadowCaster& caster : casters.row(static_cast<int>(row) + 1))
-        heights[row] = std::max(heights[row], caster.height - static_cast<double>(caster.distance) * fall);
-    }
-  } else if (const std::vector<std::byte> bytes = payload(index); !bytes.empty()) {
-    const auto angle = std::find_if(info_.sun_deg.begin(), info_.sun_deg.end(),
-                                    [&](double known) { return std::abs(known - sun_elevation_deg) <= kSameAngleDeg; });
-    try {
-      const AngleSeeds seeds = decode_angle_seeds(grid, tile_edges(grid.shape(), tile), info_.sun_deg.size(), bytes);
-      const auto& all = travel == LightTravel::kEastward ? seeds.eastward : seeds.westward;
-      std::copy_n(all.begin() + (angle - info_.sun_deg.begin()) * static_cast<std::ptrdiff_t>(rows), rows,
-                  heights.begin());
-    } catch (const Error& error) {
-      throw error.within(fmt::format("{}: member \"{}\"", archive_.path(), seed_name(index)));
-    }
+  const double fall = info_.fall_per_half_step(grid, quantisation, sun_elevation_deg);
+  const HullSeeds seeds = hulls(index, tile);
+  const CasterRows& casters = travel == LightTravel::kEastward ? seeds.eastward : seeds.westward;
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (const ShadowCaster& caster : casters.row(static_cast<int>(row) + 1))
+      heights[row] = std::max(heights[row], caster.height - static_cast<double>(caster.distance) * fall);
   }
   for (double& height : heights) height = quantisation.offset + quantisation.scale * height;
   return heights;

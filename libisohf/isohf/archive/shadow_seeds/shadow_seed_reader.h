@@ -27,7 +27,7 @@ class ShadowSeedReader {
   [[nodiscard]] std::vector<double> entering(TileIndex index, const TileCodes& tile, LightTravel travel,
                                              double sun_elevation_deg) const;
 
-  /// The hulls themselves, none where the tile has no member. Throws Error{kInvalidArgument} for seeds of angles.
+  /// The hulls themselves, none where the tile has no member.
   [[nodiscard]] HullSeeds hulls(TileIndex index, const TileCodes& tile) const;
 
  private:

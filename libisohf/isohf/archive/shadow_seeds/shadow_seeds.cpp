@@ -300,23 +300,20 @@ CasterRows decode_direction(const TileGrid& grid, const TileEdges& edges, LightT
   return rows;
 }
 
-/// Writes the header that both kinds share.
-std::vector<std::byte> start_payload(const TileShape& shape, CodeType type, ShadowSeedInfo::Kind kind,
-                                     std::size_t angles) {
+std::vector<std::byte> start_payload(const TileShape& shape, CodeType type) {
   std::vector<std::byte> payload;
   ByteWriter writer(payload);
   writer.write(kSeedsVersion);
-  writer.write(static_cast<std::uint8_t>(kind == ShadowSeedInfo::Kind::kHulls ? 0 : 1));
+  writer.write(std::uint8_t{0});
   writer.write(static_cast<std::uint8_t>(type));
   writer.write(std::uint8_t{0});
   writer.write(static_cast<std::uint16_t>(visible_rows(shape)));
-  writer.write(static_cast<std::uint16_t>(angles));
+  writer.write(std::uint16_t{0});
   ISOHF_ASSERT(payload.size() == kHeaderBytes);
   return payload;
 }
 
-void read_header(const TileShape& shape, CodeType type, ShadowSeedInfo::Kind kind, std::size_t angles,
-                 ByteReader& reader) {
+void read_header(const TileShape& shape, CodeType type, ByteReader& reader) {
   const auto version = reader.read<std::uint8_t>();
   if (version != kSeedsVersion) {
     throw Error(ErrorCode::kUnsupported, fmt::format("version {} of seeds, {} is read", version, kSeedsVersion));
@@ -324,28 +321,11 @@ void read_header(const TileShape& shape, CodeType type, ShadowSeedInfo::Kind kin
   const auto expect = [&](const char* what, std::uint64_t found, std::uint64_t wanted) {
     if (found != wanted) refuse(fmt::format("{} is {}, must be {}", what, found, wanted));
   };
-  expect("the kind", reader.read<std::uint8_t>(), kind == ShadowSeedInfo::Kind::kHulls ? 0 : 1);
+  expect("the kind", reader.read<std::uint8_t>(), 0);
   expect("the code type", reader.read<std::uint8_t>(), static_cast<std::uint64_t>(type));
   expect("the reserved byte", reader.read<std::uint8_t>(), 0);
   expect("the number of rows", reader.read<std::uint16_t>(), static_cast<std::uint64_t>(visible_rows(shape)));
-  expect("the number of angles", reader.read<std::uint16_t>(), angles);
-}
-
-/// S of an angle as a whole number above the edge's, 0 where it is no higher.
-std::uint32_t rise_above(CodeType type, std::int32_t edge, double height) {
-  if (height == kNone) return 0;
-  const double rounded = type == CodeType::kF32 ? height : std::clamp(std::round(height), -1.0, 65534.0);
-  const std::int32_t whole = whole_from_height(type, rounded);
-  return whole > edge ? minus(whole, edge) : 0;
-}
-
-template <typename Visit>
-void for_each_angle_row(const TileShape& shape, std::size_t angles, Visit visit) {
-  for (const LightTravel travel : {LightTravel::kEastward, LightTravel::kWestward}) {
-    for (std::size_t angle = 0; angle < angles; ++angle) {
-      for (int row = 1; row <= visible_rows(shape); ++row) visit(travel, angle, row);
-    }
-  }
+  expect("the reserved number", reader.read<std::uint16_t>(), 0);
 }
 
 }  // namespace
@@ -370,11 +350,6 @@ TileEdges tile_edges(const TileShape& shape, const TileCodes& tile) {
   return edges;
 }
 
-bool AngleSeeds::empty() const {
-  const auto none = [](double height) { return height == kNone; };
-  return std::all_of(eastward.begin(), eastward.end(), none) && std::all_of(westward.begin(), westward.end(), none);
-}
-
 bool has_room_for_seeds(const TileGrid& grid) {
   return grid.tile_columns() < (std::int64_t{1} << 31) / (grid.shape().cell_columns() + 1);
 }
@@ -384,28 +359,13 @@ EncodedSeeds encode_seeds(const TileGrid& grid, const TileEdges& edges, const Hu
   SymbolWriter writer(kHullStreams);
   encode_direction(grid, edges, LightTravel::kEastward, seeds.eastward, writer);
   encode_direction(grid, edges, LightTravel::kWestward, seeds.westward, writer);
-  return writer.finish(start_payload(grid.shape(), edges.type, ShadowSeedInfo::Kind::kHulls, 0));
-}
-
-EncodedSeeds encode_seeds(const TileGrid& grid, const TileEdges& edges, const AngleSeeds& seeds, std::size_t angles) {
-  const TileShape& shape = grid.shape();
-  SymbolWriter writer(1);
-  std::uint32_t before = 0;
-  for_each_angle_row(shape, angles, [&](LightTravel travel, std::size_t angle, int row) {
-    const auto& heights = travel == LightTravel::kEastward ? seeds.eastward : seeds.westward;
-    const double height =
-        heights[angle * static_cast<std::size_t>(visible_rows(shape)) + static_cast<std::size_t>(row - 1)];
-    const std::uint32_t rise = rise_above(edges.type, edge_of(edges, row, travel), height);
-    writer.put(0, zigzag(static_cast<std::int32_t>(rise - before)));
-    before = rise;
-  });
-  return writer.finish(start_payload(shape, edges.type, ShadowSeedInfo::Kind::kAngles, angles));
+  return writer.finish(start_payload(grid.shape(), edges.type));
 }
 
 HullSeeds decode_hull_seeds(const TileGrid& grid, TileIndex index, const TileEdges& edges,
                             std::span<const std::byte> payload) {
   ByteReader bytes(payload);
-  read_header(grid.shape(), edges.type, ShadowSeedInfo::Kind::kHulls, 0, bytes);
+  read_header(grid.shape(), edges.type, bytes);
   SymbolReader reader(bytes, kHullStreams);
   // Even rows have a vertex more for each tile; a limit that holds for both keeps casters inside the heightfield.
   const std::int64_t steps = grid.shape().cell_columns() + 1;
@@ -413,30 +373,6 @@ HullSeeds decode_hull_seeds(const TileGrid& grid, TileIndex index, const TileEdg
   seeds.eastward = decode_direction(grid, edges, LightTravel::kEastward, index.column * steps, reader);
   seeds.westward =
       decode_direction(grid, edges, LightTravel::kWestward, (grid.tile_columns() - 1 - index.column) * steps, reader);
-  reader.finish();
-  return seeds;
-}
-
-AngleSeeds decode_angle_seeds(const TileGrid& grid, const TileEdges& edges, std::size_t angles,
-                              std::span<const std::byte> payload) {
-  const TileShape& shape = grid.shape();
-  ByteReader bytes(payload);
-  read_header(shape, edges.type, ShadowSeedInfo::Kind::kAngles, angles, bytes);
-  SymbolReader reader(bytes, 1);
-  AngleSeeds seeds;
-  std::uint32_t rise = 0;
-  for_each_angle_row(shape, angles, [&](LightTravel travel, std::size_t, int row) {
-    rise += unzigzag(reader.get(0));
-    const std::int32_t edge = edge_of(edges, row, travel);
-    double height = kNone;
-    if (rise != 0) {
-      const std::int32_t whole = plus(edge, rise);
-      if (whole <= edge) refuse(fmt::format("row {}: a shadow's height is no elevation", row));
-      check_height(edges.type, whole, row);
-      height = height_from_whole(edges.type, whole);
-    }
-    (travel == LightTravel::kEastward ? seeds.eastward : seeds.westward).push_back(height);
-  });
   reader.finish();
   return seeds;
 }

@@ -13,17 +13,13 @@
 #include "isohf/metadata.h"
 
 /// Shadow seeds as members of an archive (docs/archive_format.md, "Shadow seeds"): what the tiles before it cast over a
-/// tile's edge, for light travelling either way. Either hulls, which hold for every sun elevation from sun_min_deg on,
-/// or the shadow heights of a few sun elevations.
+/// tile's edge, for light travelling either way: hulls, which hold for every sun elevation from sun_min_deg on.
 
 namespace isohf {
 
 /// The metadata's member "shadow_seeds".
 struct ShadowSeedInfo {
-  enum class Kind { kHulls, kAngles };
-  Kind kind = Kind::kHulls;
-  double sun_min_deg = 2.0;     ///< kHulls: the lowest sun that they hold for
-  std::vector<double> sun_deg;  ///< kAngles: the sun elevations, ascending
+  double sun_min_deg = 2.0;  ///< the lowest sun that they hold for
   /// Elevation units in the length of one world unit: 1 where both are metres or either is unknown.
   double elevation_units_per_world_unit = 1.0;
   std::int64_t members = 0;  ///< tiles that have seeds
@@ -35,8 +31,7 @@ struct ShadowSeedInfo {
 };
 
 inline constexpr const char* kShadowSeedsName = "shadow_seeds";  ///< of the metadata's extension
-inline constexpr std::size_t kMaxSeedAngles = 64;
-inline constexpr double kMinSunDeg = 0.01;  ///< sun elevations lie from here to below 90 degrees
+inline constexpr double kMinSunDeg = 0.01;                       ///< sun elevations lie from here to below 90 degrees
 
 class JsonMembers;
 void shadow_seed_members(JsonMembers& json, ShadowSeedInfo& info);
@@ -60,14 +55,6 @@ struct HullSeeds {
   [[nodiscard]] bool empty() const { return eastward.casters.empty() && westward.casters.empty(); }
 };
 
-/// Shadow heights at a tile's edge for each angle, [angles x] one angle after the other, in codes (kF32:
-/// elevation units); minus infinity where the edge's own vertex is as high.
-struct AngleSeeds {
-  std::vector<double> eastward;
-  std::vector<double> westward;
-  [[nodiscard]] bool empty() const;
-};
-
 /// A tile's own vertices on its West and East edge, in visible rows: what heights are coded on.
 struct TileEdges {
   CodeType type = CodeType::kU16;
@@ -83,19 +70,14 @@ struct EncodedSeeds {
   std::uint32_t payload_crc32 = 0;
 };
 
-/// Codes the seeds of a tile. Heights of codes are whole numbers; those of AngleSeeds are rounded to the nearest code
-/// (half a code off at most; nearest float for kF32). Deterministic, thread-safe. The grid must satisfy
+/// Codes the seeds of a tile. Heights of codes are whole numbers. Deterministic, thread-safe. The grid must satisfy
 /// has_room_for_seeds.
 [[nodiscard]] EncodedSeeds encode_seeds(const TileGrid& grid, const TileEdges& edges, const HullSeeds& seeds);
-[[nodiscard]] EncodedSeeds encode_seeds(const TileGrid& grid, const TileEdges& edges, const AngleSeeds& seeds,
-                                        std::size_t angles);
 
 /// The inverse, from the inflated member. Trusts nothing: throws Error{kCorrupt} for whatever encode_seeds would not
 /// have made of a tile in that place and cannot be read exactly, kUnsupported for a version of the future. Thread-safe.
 [[nodiscard]] HullSeeds decode_hull_seeds(const TileGrid& grid, TileIndex index, const TileEdges& edges,
                                           std::span<const std::byte> payload);
-[[nodiscard]] AngleSeeds decode_angle_seeds(const TileGrid& grid, const TileEdges& edges, std::size_t angles,
-                                            std::span<const std::byte> payload);
 
 /// False for grids of 2^31 vertices in a row and more.
 [[nodiscard]] bool has_room_for_seeds(const TileGrid& grid);

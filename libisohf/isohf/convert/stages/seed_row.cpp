@@ -56,9 +56,7 @@ CasterRows read_casters(const SpillBuffer& bytes, std::uint64_t at) {
 
 SeedRow::SeedRow(const TileGrid& grid, const Quantisation& quantisation, const ShadowSeedInfo& info)
     : grid_(grid), quantisation_(quantisation) {
-  const double sun_min_deg = info.kind == ShadowSeedInfo::Kind::kAngles ? info.sun_deg.front() : info.sun_min_deg;
-  fall_min_ = info.fall_per_half_step(grid, quantisation, sun_min_deg);
-  for (const double degrees : info.sun_deg) falls_.push_back(info.fall_per_half_step(grid, quantisation, degrees));
+  fall_min_ = info.fall_per_half_step(grid, quantisation, info.sun_min_deg);
   // No code is below 0; how low floats go is only known at the end.
   lowest_ = quantisation.type == CodeType::kF32 ? -std::numeric_limits<double>::infinity() : 0.0;
 }
@@ -76,22 +74,8 @@ SeedRow::Tile SeedRow::prepare(const TileCodes& codes) const {
   return tile;
 }
 
-std::vector<double> SeedRow::heights_at_angles(const CasterRows& rows) const {
-  std::vector<double> heights;
-  for (const double fall : falls_) {
-    for (int row = 1; row <= visible_rows(grid_.shape()); ++row) {
-      heights.push_back(shadow_height_from(rows.row(row), fall));
-    }
-  }
-  return heights;
-}
-
 EncodedSeeds SeedRow::encode(const TileEdges& edges, const HullSeeds& seeds) const {
-  if (falls_.empty()) {
-    return seeds.empty() ? EncodedSeeds{} : encode_seeds(grid_, edges, seeds);
-  }
-  const AngleSeeds heights{heights_at_angles(seeds.eastward), heights_at_angles(seeds.westward)};
-  return heights.empty() ? EncodedSeeds{} : encode_seeds(grid_, edges, heights, falls_.size());
+  return seeds.empty() ? EncodedSeeds{} : encode_seeds(grid_, edges, seeds);
 }
 
 void SeedRow::Tiles::add(const Tile& tile) {

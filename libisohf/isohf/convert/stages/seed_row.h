@@ -58,13 +58,11 @@ class SeedRow {
 
  private:
   [[nodiscard]] EncodedSeeds encode(const TileEdges& edges, const HullSeeds& seeds) const;
-  [[nodiscard]] std::vector<double> heights_at_angles(const CasterRows& rows) const;
 
   TileGrid grid_;
   Quantisation quantisation_;
   double fall_min_;
   double lowest_;
-  std::vector<double> falls_;  ///< kAngles
 };
 
 }  // namespace isohf

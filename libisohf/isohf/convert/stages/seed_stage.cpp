@@ -10,9 +10,7 @@ namespace {
 
 ShadowSeedInfo info_of(const ShadowSeedRequest& request, double elevation_units_per_world_unit) {
   ShadowSeedInfo info;
-  info.kind = request.sun_deg.empty() ? ShadowSeedInfo::Kind::kHulls : ShadowSeedInfo::Kind::kAngles;
-  info.sun_min_deg = request.sun_deg.empty() ? request.sun_min_deg : request.sun_deg.front();
-  info.sun_deg = request.sun_deg;
+  info.sun_min_deg = request.sun_min_deg;
   info.elevation_units_per_world_unit = elevation_units_per_world_unit;
   return info;
 }
@@ -20,22 +18,10 @@ ShadowSeedInfo info_of(const ShadowSeedRequest& request, double elevation_units_
 }  // namespace
 
 void check_seed_request(const ShadowSeedRequest& request, const TileGrid& grid) {
-  const auto check = [](const char* option, double degrees) {
-    if (degrees >= kMinSunDeg && degrees < 90.0) return;
-    throw Error(
-        ErrorCode::kInvalidArgument,
-        fmt::format("{} is {} degrees, must be a sun elevation from {} to below 90", option, degrees, kMinSunDeg));
-  };
-  check("`sun_min_deg`", request.sun_min_deg);
-  for (std::size_t i = 0; i < request.sun_deg.size(); ++i) {
-    check("`shadow_seeds`", request.sun_deg[i]);
-    if (i > 0 && request.sun_deg[i] <= request.sun_deg[i - 1]) {
-      throw Error(ErrorCode::kInvalidArgument, "`shadow_seeds`: the sun elevations must ascend");
-    }
-  }
-  if (request.sun_deg.size() > kMaxSeedAngles) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("`shadow_seeds`: {} sun elevations, at most {} are possible",
-                                                         request.sun_deg.size(), kMaxSeedAngles));
+  if (!(request.sun_min_deg >= kMinSunDeg && request.sun_min_deg < 90.0)) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("`sun_min_deg` is {} degrees, must be a sun elevation from {} to below 90",
+                            request.sun_min_deg, kMinSunDeg));
   }
   if (!has_room_for_seeds(grid)) {
     throw Error(
