@@ -132,8 +132,7 @@ namespace isohf {
 [[nodiscard]] std::unique_ptr<HeightSource> open_npz(const std::string& path, const OpenOptions& options);
 
 /// A DTED cell of any level (MIL-PRF-89020B): columns of posts from South to North, each a record with a checksum,
-/// sign-magnitude metres, nodata -32767. A column's record is checked when it is first touched, its checksum unless
-/// options.ignore_checksums.
+/// sign-magnitude metres, nodata -32767. A column's record is checked with its checksum when it is first touched.
 [[nodiscard]] bool looks_like_dted(std::span<const std::byte> head);
 [[nodiscard]] std::unique_ptr<HeightSource> open_dted(const std::string& path, const OpenOptions& options);
 

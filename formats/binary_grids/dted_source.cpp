@@ -53,7 +53,6 @@ class DtedSource final : public FileSource {
     describe();
     check_size();
     checked_.assign(static_cast<std::size_t>(info_.width), false);
-    ignores_checksums_ = options.ignore_checksums;
     read_auxiliary_metadata(info_, 1);
     apply_open_options(info_, options);
   }
@@ -241,9 +240,8 @@ class DtedSource final : public FileSource {
     for (std::size_t i = 0; i < end; ++i) sum += at_u8(record, i);
     const std::uint32_t stored = at_u8(record, end) << 24U | at_u8(record, end + 1) << 16U |
                                  at_u8(record, end + 2) << 8U | at_u8(record, end + 3);
-    if (stored != sum && !ignores_checksums_) {
-      corrupt(name, fmt::format("its checksum is {}, its bytes sum up to {}; `ignore_checksums` takes them as they are",
-                                stored, sum));
+    if (stored != sum) {
+      corrupt(name, fmt::format("its checksum is {}, its bytes sum up to {}", stored, sum));
     }
     for (std::size_t i = kRecordHeadBytes; i < end; i += 2) {
       const int value = elevation(record[i], record[i + 1]);
@@ -256,7 +254,6 @@ class DtedSource final : public FileSource {
 
   std::size_t header_at_ = 0;
   std::string header_;  // UHL, DSI, ACC
-  bool ignores_checksums_ = false;
   std::vector<bool> checked_;
   std::vector<std::byte> record_;
 };

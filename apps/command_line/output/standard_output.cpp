@@ -32,7 +32,6 @@ constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
     {"fill", "--fill"},
     {"fit", "--fit"},
     {"geoid", "--geoid"},
-    {"ignore_checksums", "--ignore-checksums"},
     {"jpeg_quality", "--texture-quality"},
     {"levels", "--levels"},
     {"like", "--like"},

@@ -102,9 +102,6 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
   line.option("--z-offset", "NUMBER", "Add NUMBER to scaled values (default: the file's, else 0)",
               [&](const std::string& text) { options.z_offset = parse_number_in(text, -1e20, 1e20); });
   add_raw_option(line, options);
-  line.flag("--ignore-checksums",
-            "Take the columns of DTED files whose checksum is wrong as they are (default: refuse)",
-            options.ignore_checksums);
   line.option("--sample-spacing", "METRES",
               "Set the distance of neighbouring samples, instead of the file's: metres, or with a unit as in 100ft",
               [&](const std::string& text) { options.spacing = parse_length(text).value; });
