@@ -53,7 +53,7 @@ Examples:
   isohf convert dem.tif -o dem.isohf --density 0.866 --outside void --overwrite
   isohf convert dem.tif dem.isohf --texture orthophoto.tif
   isohf convert N4*E00*.hgt alps.isohf               many inputs form one surface
-  isohf convert tiles/ -o land.isohf --require-complete
+  isohf convert tiles/ -o land.isohf --strict        fails if a tile is missing
   isohf convert heights.exr h.isohf --channel R --z-scale 1200 --sample-spacing 2
   isohf convert tiles/ -o part-3.isohf --shard 3/64 --z-range -100:5000    one of many machines
   isohf plan dem.tif                  the same options without writing: see what comes out
@@ -90,7 +90,7 @@ void check_each_options(const CommandLine& line, const ConvertCommandOptions& op
   }
   if (!options.each.each) return;
   if (options.each.folder.empty()) refuse("--each needs --out-dir DIR, where the archives go");
-  for (const char* option : {"--output", "--dry-run", "--source-name", "--overlap", "--require-complete"}) {
+  for (const char* option : {"--output", "--dry-run", "--overlap"}) {
     if (line.given(option)) refuse(fmt::format("{} is for one archive, --each makes many; leave one out", option));
   }
 }
@@ -148,8 +148,6 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
   add_each_options(line, options.each);
   add_source_options(line, options.open);
   add_mosaic_options(line, options.inputs);
-  line.option("--source-name", "NAME",
-              "Record NAME as the source, instead of the input's file name or a mosaic's files", options.source_name);
   add_lattice_options(line, options.convert.plan, options.spacing_in_metres);
   add_ground_options(line, options.convert.plan.ground);
   add_geoid_option(line, options.geoid);
@@ -234,10 +232,6 @@ Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files)
   if (const std::string& file = options.geoid.path; !file.empty()) {
     prepared.files.push_back(file);
     options.convert.source_note.fingerprint += fmt::format(" | {} {}", file, FileStamp::of(file).text());
-  }
-  if (!options.source_name.empty()) {
-    options.convert.source_note.name = options.source_name;
-    options.convert.source_note.mosaic.reset();
   }
   prepared.photo = open_texture(options.texture, options.convert.texture);
   check_spacing_unit(prepared.source->info(), options.convert.plan, options.spacing_in_metres);

@@ -24,7 +24,6 @@ struct ConvertCommandOptions {
   SourceInputs inputs;
   std::string input;  ///< what messages and reports call them: the file, or "mosaic of 12 files"
   std::string output;
-  std::string source_name;
   OpenOptions open;
   TextureOptions texture;
   ConvertOptions convert;

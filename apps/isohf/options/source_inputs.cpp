@@ -88,8 +88,6 @@ void add_mosaic_options(CommandLine& line, SourceInputs& inputs) {
       [&](const std::string& text) {
         inputs.overlap = parse_word(text, {"last", "first"}) == 0 ? OverlapRule::kLast : OverlapRule::kFirst;
       });
-  line.flag("--require-complete", "Fail where tiles are missing or ground lies in no input, and name it",
-            inputs.require_complete);
   line.flag("--recursive", "Look into the folders of a folder as well", inputs.recursive);
 }
 
@@ -123,9 +121,9 @@ bool takes_numbers(const std::string& option) {
 RecordedOptions recorded_options(const CommandLine& line) {
   RecordedOptions recorded;
   for (auto& [name, text] : line.texts_in({"Input", "Several inputs"})) {
-    // Neither what files are found by nor what the archive calls them: the same samples, the same bytes.
-    const bool says_how = name != "--require-complete" && name != "--source-name" && name != "--recursive";
-    if (says_how) recorded.emplace_back(name.substr(2), takes_numbers(name) ? with_plain_numbers(text) : text);
+    // Not what files are found by: the same samples, the same bytes.
+    if (name != "--recursive")
+      recorded.emplace_back(name.substr(2), takes_numbers(name) ? with_plain_numbers(text) : text);
   }
   for (auto& [name, text] : line.texts_in({"Ground"})) {
     if (name == "--geoid") recorded.emplace_back("geoid", file_name(text));
@@ -166,9 +164,6 @@ OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inp
   const std::string name = fmt::format("mosaic of {} files", files.size());
   WorkArena arena(job.threads);
   MosaicPlan plan = arena.execute([&] { return plan_mosaic(files, options, inputs.box, inputs.onto); });
-  if (inputs.require_complete && plan.holes.samples > 0) {
-    throw Error(ErrorCode::kIo, name + ": --require-complete: " + plan.holes.describe(MosaicHoles::kMostNamed));
-  }
   opened.is_reprojected = plan.is_reprojected;
   opened.note.name = name;
   opened.note.mosaic = record_of(plan, inputs.overlap);

@@ -24,14 +24,13 @@ using RecordedOptions = std::vector<std::pair<std::string, std::string>>;
 struct SourceInputs {
   std::vector<std::string> names;  ///< files, folders, patterns and @lists, as on the command line
   OverlapRule overlap = OverlapRule::kLast;
-  bool require_complete = false;
   bool recursive = false;
   std::optional<BoundingBox> box;           ///< of the whole, only this part
   std::optional<RecordedOptions> as_given;  ///< for the archive's metadata
   ProjectionRequest onto;                   ///< the map on which inputs of different reference systems are joined
 };
 
-/// --bbox, and the group "Several inputs": --overlap, --require-complete, --recursive.
+/// --bbox, and the group "Several inputs": --overlap, --recursive.
 void add_mosaic_options(CommandLine& line, SourceInputs& inputs);
 
 /// After parsing: the options of the groups "Input" and "Several inputs" that say how samples are read, and of a geoid
@@ -56,7 +55,6 @@ struct OpenedInputs {
 };
 
 /// Opens what `files`, as expand_inputs gives them, are together: the file itself where it is one, else their mosaic.
-/// With --require-complete ground without a file is an Error{kIo}.
 [[nodiscard]] OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inputs,
                                        const OpenOptions& options, const WorkOptions& work);
 

@@ -193,8 +193,7 @@ TEST_F(ConvertEach, AnInterruptLeavesWhatResumeGoesOnWith) {
 }
 
 TEST_F(ConvertEach, SaysWhichOptionsAreForOneArchive) {
-  for (const std::vector<std::string>& more :
-       {std::vector<std::string>{"-o", "x.isohf"}, {"--source-name", "x"}, {"--dry-run"}}) {
+  for (const std::vector<std::string>& more : {std::vector<std::string>{"-o", "x.isohf"}, {"--dry-run"}}) {
     const RunResult result = each(more);
     EXPECT_EQ(result.exit_code, 2);
     EXPECT_THAT(result.err, HasSubstr("is for one archive"));

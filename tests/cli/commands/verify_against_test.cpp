@@ -111,8 +111,7 @@ TEST_F(VerifyAgainst, TakesTheOptionsOfTheInputFromTheArchive) {
         {"--type", "u8"},
         {"--type", "f32"},
         {"--filter", "bspline3", "--acquisition", "box"},
-        {"--shadow-seeds"},
-        {"--source-name", "other"}}},
+        {"--shadow-seeds"}}},
       {"alpha.tif", {{}, {"--channel", "0"}, {"--channel", "1"}, {"--nodata", "7"}, {"--fill"}, {"--lossless"}}},
       {"plain.bin",
        {{"--raw", "60x45:u16le"},
@@ -131,7 +130,6 @@ TEST_F(VerifyAgainst, TakesTheOptionsOfTheInputFromTheArchive) {
       {"tiles",
        {{"--recursive"},
         {"--recursive", "--overlap", "first"},
-        {"--recursive", "--overlap", "first", "--source-name", "x"},
         {"--recursive", "--bbox", "5.2,44.1,5.5,44.3", "--fill"}}},
   };
   for (const auto& [input, options] : cases) {
