@@ -212,9 +212,11 @@ bool is_complete(const ConvertCommandOptions& options, const Prepared& prepared)
   throw Error(code, {options.output, difference, "", "--overwrite makes it anew"});
 }
 
-ordered_json json_of_complete(const std::string& input, const std::string& output, const char* status) {
-  return {
-      {"input", input}, {"output", output}, {"status", status}, {"archive_bytes", std::filesystem::file_size(output)}};
+ordered_json json_of_complete(const std::string& input, const std::string& output) {
+  return {{"input", input},
+          {"output", output},
+          {"status", "complete"},
+          {"archive_bytes", std::filesystem::file_size(output)}};
 }
 
 /// The files of --each, their archives where they may be written.
@@ -233,35 +235,12 @@ std::vector<EachFile> checked_files(const ConvertCommandOptions& options) {
     }
     if (count++ == 0) existing = file.output;
   }
-  if (count > 0 && !options.convert.overwrite && !options.convert.resume && !options.each.skip_existing) {
+  if (count > 0 && !options.convert.overwrite && !options.convert.resume) {
     throw Error(ErrorCode::kInvalidArgument,
                 {existing, count == 1 ? "exists" : fmt::format("exists, and {} more archives do", count - 1), "",
-                 "--skip-existing leaves them as they are, --resume checks them, --overwrite replaces them"});
+                 "--resume leaves those that are complete, --overwrite replaces them"});
   }
   return files;
-}
-
-/// Throws Error where the archive is not complete.
-EachResult skipped(const EachFile& file) {
-  const ArchiveReader complete(file.output);
-  return {EachResult::State::kSkipped, json_line(json_of_complete(file.input, file.output, "skipped")), {}};
-}
-
-/// What became of a file that failed because another run makes its archive, or just has; nullopt where none does.
-std::optional<EachResult> made_by_another(const EachFile& file) {
-  try {
-    if (File part(file.output + ".part", File::Mode::kRead); !part.try_lock()) {
-      return EachResult{EachResult::State::kBusy,
-                        json_line({{"input", file.input}, {"output", file.output}, {"status", "busy"}}),
-                        {}};
-    }
-  } catch (const Error&) {  // there is no part
-  }
-  try {
-    return skipped(file);
-  } catch (const Error&) {
-    return std::nullopt;
-  }
 }
 
 /// One of --each; nullopt where the share is too small for it.
@@ -274,15 +253,6 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
   share_memory(options);
   const std::filesystem::path output(file.output);
   std::error_code none;
-  if (options.each.skip_existing && std::filesystem::exists(output, none)) {
-    try {
-      return skipped(file);
-    } catch (const Error& error) {
-      if (!options.convert.overwrite) {
-        throw Error(error.code(), {file.output, incomplete(file.output, error), "", "--overwrite replaces it"});
-      }
-    }
-  }
   std::error_code failure;
   std::filesystem::create_directories(output.parent_path(), failure);
   if (failure && !std::filesystem::exists(output.parent_path(), none)) {
@@ -295,8 +265,7 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
   const Prepared prepared = prepare(options, {file.input});
   const SourceInfo& info = prepared.source->info();
   if (is_complete(options, prepared)) {
-    return EachResult{
-        EachResult::State::kComplete, json_line(json_of_complete(file.input, file.output, "complete")), {}};
+    return EachResult{false, json_line(json_of_complete(file.input, file.output)), {}};
   }
   Job job;
   job.threads = share.threads;
@@ -312,22 +281,13 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
   ConvertSummary summary = convert(*prepared.source, file.output, options.convert, job);
   const ordered_json document =
       document_of(options, summary, counts_of_voids(*prepared.source, summary.source_voids), std::nullopt);
-  return EachResult{EachResult::State::kConverted, json_line(document), std::move(summary.warnings), std::move(note)};
+  return EachResult{true, json_line(document), std::move(summary.warnings), std::move(note)};
 }
 
 int run_each(const ConvertCommandOptions& options) {
   return convert_each(
       checked_files(options), options.each, options.work, options.common,
-      [&](const EachFile& file, const EachShare& share) {
-        try {
-          return convert_one(options, file, share);
-        } catch (const Error& error) {
-          if (!options.each.skip_existing || error.code() == ErrorCode::kCancelled) throw;
-          std::optional<EachResult> result = made_by_another(file);
-          if (!result) throw;
-          return result;
-        }
-      },
+      [&](const EachFile& file, const EachShare& share) { return convert_one(options, file, share); },
       watch_interrupts());
 }
 
@@ -348,7 +308,7 @@ int run(ConvertCommandOptions options) {
   }
   if (is_complete(options, prepared)) {
     StandardOutput out;
-    if (common.json) out.write(json_text(json_of_complete(options.input, options.output, "complete")));
+    if (common.json) out.write(json_text(json_of_complete(options.input, options.output)));
     if (!common.json && !common.quiet) {
       out.write(fmt::format("{}: complete already, made of this input with these options\n", options.output));
     }

@@ -117,15 +117,13 @@ class Batch {
   int finish() {
     if (fault_) std::rethrow_exception(fault_);
     display_.clear();
-    const std::size_t begun = converted_ + complete_ + skipped_ + busy_ + failed_.size();
+    const std::size_t begun = converted_ + complete_ + failed_.size();
     const double seconds = std::chrono::duration<double>(Clock::now() - started_).count();
     if (common_.json) {
       out_.write(json_line({{"summary",
                              {{"files", files_.size()},
                               {"converted", converted_},
                               {"complete", complete_},
-                              {"skipped", skipped_},
-                              {"busy", busy_},
                               {"failed", failed_.size()},
                               {"not_done", files_.size() - begun},
                               {"seconds", seconds}}}}));
@@ -136,8 +134,6 @@ class Batch {
         if (count > 0) text += fmt::format(", {} {}", number(count), what);
       };
       add(complete_, "complete before");
-      add(skipped_, "skipped");
-      add(busy_, "being made by another run");
       add(failed_.size(), "failed");
       add(files_.size() - begun, "not done");
       out_.write(text + " in " + describe_seconds(seconds) + "\n");
@@ -157,11 +153,7 @@ class Batch {
   void tell(const EachFile& file, const Outcome& outcome) {
     ordered_json document = {{"input", file.input}, {"output", file.output}};
     if (const auto* result = std::get_if<EachResult>(&outcome); result != nullptr) {
-      using State = EachResult::State;
-      (result->state == State::kConverted  ? converted_
-       : result->state == State::kComplete ? complete_
-       : result->state == State::kSkipped  ? skipped_
-                                           : busy_) += 1;
+      (result->is_converted ? converted_ : complete_) += 1;
       if (!result->warnings.empty() || !result->note.empty()) display_.clear();
       if (!result->note.empty() && !common_.quiet) print_note(result->note);
       for (const Warning& warning : result->warnings) {
@@ -199,8 +191,6 @@ class Batch {
   std::map<std::size_t, Outcome> waiting_;  ///< for those before them
   std::size_t converted_ = 0;
   std::size_t complete_ = 0;
-  std::size_t skipped_ = 0;
-  std::size_t busy_ = 0;
   std::vector<Error> failed_;
   bool stopped_ = false;
   bool interrupted_ = false;
@@ -215,8 +205,6 @@ void add_each_options(CommandLine& line, EachOptions& options) {
   line.flag("--each", "Make one archive of each input: DIR/NAME.isohf, small ones side by side; all names are inputs",
             options.each);
   line.option("--out-dir", "DIR", "The folder for the archives of --each; made where absent", options.folder);
-  line.flag("--skip-existing", "With --each: leave archives as they are that exist and are complete",
-            options.skip_existing);
   line.flag("--keep-going", "With --each: go on where a file fails; exit code 1 at the end", options.keep_going);
 }
 

@@ -19,10 +19,9 @@ struct EachFile {
 
 /// What convert --each is asked for beyond the conversions themselves.
 struct EachOptions {
-  std::string folder;          ///< --out-dir; empty: a single archive
-  bool each = false;           ///< --each
-  bool skip_existing = false;  ///< a complete archive is left as it is
-  bool keep_going = false;     ///< a file that fails does not stop the others
+  std::string folder;       ///< --out-dir; empty: a single archive
+  bool each = false;        ///< --each
+  bool keep_going = false;  ///< a file that fails does not stop the others
 };
 
 void add_each_options(CommandLine& line, EachOptions& options);
@@ -41,9 +40,8 @@ struct EachShare {
 
 /// What became of a file.
 struct EachResult {
-  enum class State { kConverted, kComplete, kSkipped, kBusy };
-  State state = State::kConverted;
-  std::string document;  ///< JSON members on one line
+  bool is_converted = true;  ///< else it was complete before
+  std::string document;      ///< JSON members on one line
   std::vector<Warning> warnings;
   std::string note = {};  ///< not for --quiet
 };

@@ -85,7 +85,7 @@ void check_each_options(const CommandLine& line, const ConvertCommandOptions& op
   const auto refuse = [](const std::string& why) {
     throw Error(ErrorCode::kInvalidArgument, {"convert", why, "", ""});
   };
-  for (const char* option : {"--out-dir", "--skip-existing", "--keep-going"}) {
+  for (const char* option : {"--out-dir", "--keep-going"}) {
     if (!options.each.each && line.given(option)) refuse(std::string(option) + " needs --each");
   }
   if (!options.each.each) return;

@@ -1,9 +1,7 @@
 /// convert --each: one archive of each input, in one run.
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -106,11 +104,11 @@ TEST_F(ConvertEach, LeavesExistingArchivesUnlessToldWhatToDo) {
   const std::string before = read_text(out_ + "/a.isohf");
   const RunResult refused = each();
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.err, HasSubstr("exists, and 5 more archives do; --skip-existing"));
+  EXPECT_THAT(refused.err, HasSubstr("exists, and 5 more archives do; --resume"));
   fs::remove(out_ + "/c.isohf");
-  const RunResult skipped = each({"--skip-existing"});
-  EXPECT_EQ(skipped.exit_code, 0);
-  EXPECT_THAT(skipped.out, testing::StartsWith("6 files: 1 converted, 5 skipped in "));
+  const RunResult resumed = each({"--resume"});
+  EXPECT_EQ(resumed.exit_code, 0);
+  EXPECT_THAT(resumed.out, testing::StartsWith("6 files: 1 converted, 5 complete before in "));
   EXPECT_EQ(read_text(out_ + "/a.isohf"), before);
   EXPECT_THAT(each({"--resume"}).out, testing::StartsWith("6 files: 0 converted, 6 complete before in "));
   EXPECT_THAT(each({"--overwrite"}).out, testing::StartsWith("6 files: 6 converted in "));
@@ -119,18 +117,13 @@ TEST_F(ConvertEach, LeavesExistingArchivesUnlessToldWhatToDo) {
 TEST_F(ConvertEach, TakesAnIncompleteFileOfThatNameForAnError) {
   ASSERT_EQ(each().exit_code, 0);
   fs::resize_file(out_ + "/b.isohf", fs::file_size(out_ + "/b.isohf") / 2);
-  const RunResult result = each({"--skip-existing", "--keep-going"});
+  const RunResult result = each({"--resume", "--keep-going"});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, HasSubstr("b.isohf: is no complete archive: "));
-  EXPECT_THAT(result.out, testing::StartsWith("6 files: 0 converted, 5 skipped, 1 failed in "));
-  // No argument is at fault, and the file's name need not be said twice.
-  const RunResult resumed = each({"--resume"});
-  EXPECT_EQ(resumed.exit_code, 1);
-  for (const std::string& line : {result.err, resumed.err}) {
-    const std::size_t name = line.find("b.isohf: is no complete archive: ");
-    ASSERT_NE(name, std::string::npos) << line;
-    EXPECT_EQ(line.find("b.isohf", name + 1), std::string::npos) << line;
-  }
+  EXPECT_THAT(result.out, testing::StartsWith("6 files: 0 converted, 5 complete before, 1 failed in "));
+  // The file's name need not be said twice.
+  const std::size_t name = result.err.find("b.isohf: is no complete archive: ");
+  ASSERT_NE(name, std::string::npos) << result.err;
+  EXPECT_EQ(result.err.find("b.isohf", name + 1), std::string::npos) << result.err;
 }
 
 TEST_F(ConvertEach, SaysThatItThrowsAwayWhatAnInterruptedRunLeftAsASingleRunDoes) {
@@ -153,12 +146,12 @@ TEST_F(ConvertEach, StopsAtABadFileOrKeepsGoing) {
   EXPECT_EQ(stopped.exit_code, 1);
   EXPECT_THAT(stopped.out, testing::StartsWith("6 files: 1 converted, 1 failed, 4 not done in "));
   EXPECT_THAT(archives(), ElementsAre("a.isohf"));
-  const RunResult going = each({"--skip-existing", "--keep-going", "--json"});
+  const RunResult going = each({"--resume", "--keep-going", "--json"});
   EXPECT_EQ(going.exit_code, 1);
   EXPECT_THAT(going.err, testing::StartsWith("isohf: " + in_ + "/b.asc: "));
   const std::vector<json> lines = lines_of(going.out);
   ASSERT_EQ(lines.size(), 7U);
-  EXPECT_EQ(lines[0].at("status"), "skipped");
+  EXPECT_EQ(lines[0].at("status"), "complete");
   EXPECT_EQ(lines[1].at("status"), "failed");
   EXPECT_EQ(lines[1].at("error").at("where"), in_ + "/b.asc");
   EXPECT_EQ(lines[6].at("summary").at("failed"), 1);
@@ -200,24 +193,6 @@ TEST_F(ConvertEach, SaysWhichOptionsAreForOneArchive) {
   }
   EXPECT_THAT(run_isohf({"convert", "a", "b", "--keep-going"}).err, HasSubstr("--keep-going needs --each"));
   EXPECT_THAT(run_isohf({"convert", "--each", "a"}).err, HasSubstr("--each needs --out-dir"));
-}
-
-TEST_F(ConvertEach, LeavesWhatAnotherRunMakesToIt) {
-  fs::create_directories(out_);
-  const std::string part = out_ + "/c.isohf.part";
-  write_text(part, "");
-  const int held = ::open(part.c_str(), O_RDWR);
-  ASSERT_EQ(::flock(held, LOCK_EX), 0);
-  const RunResult busy = each({"--skip-existing", "--keep-going", "--json"});
-  EXPECT_EQ(busy.exit_code, 0) << busy.err;
-  EXPECT_EQ(busy.err, "");
-  const std::vector<json> lines = lines_of(busy.out);
-  ASSERT_EQ(lines.size(), 7U);
-  EXPECT_EQ(lines[2].at("status"), "busy");
-  EXPECT_EQ(lines[6].at("summary").at("busy"), 1);
-  EXPECT_EQ(lines[6].at("summary").at("converted"), 5);
-  EXPECT_EQ(each({"--overwrite", "--keep-going"}).exit_code, 1);  // who did not ask to leave it
-  ::close(held);
 }
 
 TEST_F(ConvertEach, SaysWhyAFolderCannotBeMade) {

@@ -109,7 +109,7 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
                 {"convert", "--each", coast, folder / "bad.asc", voids, "--out-dir", folder / "each", "--keep-going",
                  "--progress", "json"});
   documents.run(0, "convert-each-line",
-                {"convert", "--each", coast, voids, "--out-dir", folder / "each", "--skip-existing", "-v"});
+                {"convert", "--each", coast, voids, "--out-dir", folder / "each", "--resume", "-v"});
   documents.run(0, "convert-each-line", {"convert", "--each", coast, "--out-dir", folder / "each", "--resume"});
 
   documents.run(0, "plan", {"plan"});
