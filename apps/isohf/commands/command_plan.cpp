@@ -30,7 +30,7 @@ constexpr const char* kPlanFooter =
 equilateral. With INPUT nothing is written; sizes are estimates.
 
 Examples:
-  isohf plan --levels 4 --triangles 10000
+  isohf plan --levels 4 --shape 10000
   isohf plan --shape 212x243
   isohf plan dem.tif --density 0.866
   isohf plan tiles/                   what many rasters make together)";

@@ -16,23 +16,19 @@ constexpr std::int64_t kMostCount = std::numeric_limits<std::int32_t>::max();
 
 void add_shape_options(CommandLine& line, PlanRequest& request) {
   line.group("Tile shape");
-  line.option("--shape", "CxR", "Stored elevations of one tile, columns by rows, as in 212x243",
+  line.option("--shape", "CxR|N",
+              "Stored elevations of one tile, columns by rows, as in 212x243; or the shape of about N triangles",
               [&](const std::string& text) {
+                if (text.find_first_of("xX") == std::string::npos) {
+                  request.budget = ShapeBudget{ShapeBudget::Kind::kTriangles, parse_whole_number(text, 1, kMostCount)};
+                  return;
+                }
                 const auto [columns, rows] = parse_size(text, 1, kMaxTileRows);
                 request.shape = {static_cast<int>(columns), static_cast<int>(rows)};
               });
   line.option(
       "--levels", "N", "Levels of detail, 1 to 14 (default 4, fewer for a small input)",
       [&](const std::string& text) { request.levels = static_cast<int>(parse_whole_number(text, 1, kMaxTileLevels)); });
-  line.option("--triangles", "N", "Choose the shape of tiles with about N triangles each",
-              [&](const std::string& text) {
-                request.budget = ShapeBudget{ShapeBudget::Kind::kTriangles, parse_whole_number(text, 1, kMostCount)};
-              });
-  line.option("--vertices", "N", "Choose the shape of tiles with about N stored elevations each",
-              [&](const std::string& text) {
-                request.budget = ShapeBudget{ShapeBudget::Kind::kVertices, parse_whole_number(text, 1, kMostCount)};
-              });
-  line.exclusive({"--shape", "--triangles", "--vertices"});
 }
 
 void check_spacing_unit(const SourceInfo& info, const PlanRequest& request, bool spacing_in_metres) {

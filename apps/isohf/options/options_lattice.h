@@ -7,7 +7,7 @@
 
 namespace isohf::cli {
 
-/// The shape of tiles: --shape, --levels, --triangles, --vertices.
+/// The shape of tiles: --shape, --levels.
 void add_shape_options(CommandLine& line, PlanRequest& request);
 
 /// How the lattice lies over the input: --density, --spacing, --tiles, --fit, --outside. spacing_in_metres: --spacing

@@ -256,7 +256,7 @@ MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const Conve
 
 void check_memory(const MemoryPlan& memory, const Job& job) {
   require_memory(job, static_cast<double>(memory.bytes), static_cast<double>(memory.least_bytes), "this conversion",
-                 "smaller tiles (`shape`, `budget`)");
+                 "smaller tiles (`shape`)");
 }
 
 }  // namespace isohf

@@ -14,7 +14,7 @@ using nlohmann::json;
 using testing::HasSubstr;
 
 TEST(PlanCommand, CandidatesLieNearTheBudgetBestAspectFirst) {
-  const RunResult result = run_isohf({"plan", "--levels", "4", "--triangles", "10000", "--json"});
+  const RunResult result = run_isohf({"plan", "--levels", "4", "--shape", "10000", "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const json candidates = json::parse(result.out).at("candidates");
   ASSERT_FALSE(candidates.empty());
