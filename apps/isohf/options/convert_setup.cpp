@@ -129,7 +129,6 @@ void share_memory(ConvertCommandOptions& options) {
 
 std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
   ConvertCommandOptions options;
-  bool no_planes = false;
   std::optional<double> sun_min_deg;
   CommandLine line("convert", "Turns rasters of elevations into an archive of isometric heightfield tiles.");
   line.group("Arguments");
@@ -170,7 +169,6 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
                 options.convert.effort = static_cast<Effort>(parse_word(text, {"fast", "default", "best"}));
               });
   line.words({"fast", "default", "best"});
-  line.flag("--no-planes", "Leave out the coarse planes, by which the archive is looked at from afar", no_planes);
   line.group("Shadows");
   bool shadow_seeds = false;
   line.flag(
@@ -211,7 +209,6 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
     throw Error(ErrorCode::kInvalidArgument,
                 "convert: --lossless keeps the input's own samples, --geoid changes them; give one of the two");
   }
-  options.convert.planes = !no_planes;
   options.inputs.as_given = recorded_options(line);
   check_texture_options(options.texture);
   options.work.scratch_folder = scratch_folder_for(options.each.each ? options.each.folder + "/" : options.output);

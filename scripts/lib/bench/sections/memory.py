@@ -6,8 +6,7 @@ import re
 # Conversions: archive, options.
 KINDS = {"bilinear": ["--filter", "bilinear"], "bspline3": ["--filter", "bspline3"],
          "with seeds": ["--filter", "bilinear", "--shadow-seeds"], "--lossless": ["--filter", "bilinear", "--lossless"],
-         "--fill": ["--filter", "bilinear", "--nodata", "900", "--fill"],
-         "--no-planes": ["--filter", "bilinear", "--no-planes"]}
+         "--fill": ["--filter", "bilinear", "--nodata", "900", "--fill"]}
 # What is read: the archive of a kind above, and how; OUT is written, or nothing.
 READERS = {"export": ("bilinear", ["export", "IN", "OUT.npy"]),
            "export to a GeoTIFF": ("bilinear", ["export", "IN", "OUT.tif"]),
