@@ -41,7 +41,6 @@ _isohf() {
     *' --method') values='hex barycentric average' ;;
     *' --azimuth') values='E W' ;;
     *' --palette') values='elevation gray' ;;
-    *' --texture-format') values='png jpeg' ;;
     'view --mode') values='elevation levels strips texture normals' ;;
   esac
   if [[ -n $values ]]; then

@@ -32,7 +32,6 @@ constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
     {"fill", "--fill"},
     {"fit", "--fit"},
     {"geoid", "--geoid"},
-    {"jpeg_quality", "--texture-quality"},
     {"levels", "--levels"},
     {"like", "--like"},
     {"lossless", "--lossless"},

@@ -13,9 +13,6 @@
 namespace isohf::cli {
 
 void add_texture_options(CommandLine& line, TextureOptions& options) {
-  const auto take = [&options](const char* name) {
-    if (options.first_given.empty()) options.first_given = name;
-  };
   line.group("Textures");
   line.option(
       "--texture", "PHOTO",
@@ -23,40 +20,28 @@ void add_texture_options(CommandLine& line, TextureOptions& options) {
       "the input's ground; any format that OpenImageIO reads, larger than memory if need be",
       options.photo);
   line.option(
-      "--texture-format", "KIND",
-      "png or jpeg (default jpeg, png where the photo has alpha or shows a part of the ground)",
-      [&options, take](const std::string& text) {
-        options.request.format = parse_word(text, {"png", "jpeg"}) == 0 ? TextureFormat::kPng : TextureFormat::kJpeg;
-        take("--texture-format");
-      });
-  line.option(
       "--texture-size", "N",
       "Texels on a side at most, a power of two from 64 to 4096 (default 1024); fewer where the photo has no more",
-      [&options, take](const std::string& text) {
+      [&options](const std::string& text) {
         const std::int64_t size = parse_whole_number(text, kMinTextureSize, kMaxTextureSize);
         if (!std::has_single_bit(static_cast<std::uint64_t>(size))) {
           throw Error(ErrorCode::kInvalidArgument, fmt::format("found '{}', must be a power of two", text));
         }
-        options.request.max_size = static_cast<int>(size);
-        take("--texture-size");
+        options.max_size = static_cast<int>(size);
       });
-  line.option("--texture-quality", "N", "Quality of JPEG textures, 1 to 100 (default 90)",
-              [&options, take](const std::string& text) {
-                options.request.jpeg_quality = static_cast<int>(parse_whole_number(text, 1, 100));
-                take("--texture-quality");
-              });
 }
 
 void check_texture_options(const TextureOptions& options) {
-  if (options.photo.empty() && !options.first_given.empty()) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("convert: {} needs --texture PHOTO", options.first_given));
+  if (options.photo.empty() && options.max_size) {
+    throw Error(ErrorCode::kInvalidArgument, "convert: --texture-size needs --texture PHOTO");
   }
 }
 
 std::unique_ptr<PhotoSource> open_texture(const TextureOptions& options, std::optional<TextureRequest>& request) {
   if (options.photo.empty()) return nullptr;
   std::unique_ptr<PhotoSource> photo = open_photo(options.photo);
-  request = options.request;
+  request.emplace();
+  request->max_size = options.max_size.value_or(request->max_size);
   request->photo = photo.get();
   return photo;
 }

@@ -10,15 +10,14 @@
 
 namespace isohf::cli {
 
-/// --texture and what belongs to it.
+/// --texture and --texture-size.
 struct TextureOptions {
   std::string photo;  ///< empty: no textures
-  TextureRequest request;
-  std::string first_given;  ///< of the others, for the message where --texture is missing
+  std::optional<int> max_size;
 };
 
 void add_texture_options(CommandLine& line, TextureOptions& options);
-/// Throws Error{kInvalidArgument} where there is no photo for the other options.
+/// Throws Error{kInvalidArgument} for a size without a photo.
 void check_texture_options(const TextureOptions& options);
 
 /// Opens the photo and fills `request`, which points to it; nullptr where none was asked for.

@@ -59,20 +59,14 @@ TEST_F(TextureOption, CutsTexturesThatInfoTellsAndVerifyChecks) {
   EXPECT_EQ(run_isohf({"verify", folder / "a.isohf"}).exit_code, 0);
 }
 
-TEST_F(TextureOption, TakesFormatSizeAndQuality) {
-  const RunResult png =
-      convert({"--texture", folder / "photo.ppm", "--texture-format", "png", "--texture-size=64", "--json"});
-  ASSERT_EQ(png.exit_code, 0) << png.err;
-  const json summary = json::parse(png.out);
-  EXPECT_EQ(summary.at("metadata").at("tile_textures").at("format"), "png");
+TEST_F(TextureOption, TakesASize) {
+  const RunResult made = convert({"--texture", folder / "photo.ppm", "--texture-size=64", "--json"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const json summary = json::parse(made.out);
+  EXPECT_EQ(summary.at("metadata").at("tile_textures").at("format"), "jpeg");
   EXPECT_EQ(summary.at("metadata").at("tile_textures").at("size"), 64);
   EXPECT_EQ(summary.at("texture_bytes"), summary.at("metadata").at("tile_textures").at("bytes"));
   EXPECT_GT(summary.at("photo_pixels_per_texel"), 1.0);
-  const auto bytes_at = [&](const char* quality) {
-    const RunResult result = convert({"--texture", folder / "photo.ppm", "--texture-quality", quality, "--json"});
-    return json::parse(result.out).at("texture_bytes").get<std::int64_t>();
-  };
-  EXPECT_LT(bytes_at("20"), bytes_at("95"));
 }
 
 TEST_F(TextureOption, RefusesWhatItCannotUse) {
@@ -88,8 +82,6 @@ TEST_F(TextureOption, RefusesWhatItCannotUse) {
   };
   refused({"--texture-size", "128"}, 2, "--texture-size needs --texture PHOTO");
   refused({"--texture", folder / "photo.ppm", "--texture-size", "100"}, 2, "power of two");
-  refused({"--texture", folder / "photo.ppm", "--texture-format", "gif"}, 2, "png");
-  refused({"--texture", folder / "photo.ppm", "--texture-quality", "0"}, 2, "1");
   refused({"--texture", folder / "none.jpg"}, 1, "none.jpg");
   write_file(folder / "text.jpg", "no picture at all");
   refused({"--texture", folder / "text.jpg"}, 1, "text.jpg");
@@ -103,7 +95,7 @@ TEST_F(TextureOption, ShadeShowsThePhoto) {
   std::string bytes = "P6\n400 240\n255\n";
   for (int i = 0; i < 400 * 240; ++i) bytes += i % 400 < 200 ? std::string("\xC8\0\0", 3) : std::string("\0\0\xC8", 3);
   write_file(folder / "halves.ppm", bytes);
-  ASSERT_EQ(convert({"--texture", folder / "halves.ppm", "--texture-format", "png"}).exit_code, 0);
+  ASSERT_EQ(convert({"--texture", folder / "halves.ppm"}).exit_code, 0);
   for (const char* size : {"400x240", "90x54"}) {
     const RunResult result = run_isohf({"shade", folder / "a.isohf", "-o", folder / "s.tif", "--texture", "--no-shadow",
                                         "--exaggeration", "0.001", "--size", size, "--overwrite"});
@@ -121,8 +113,9 @@ TEST_F(TextureOption, ShadeShowsThePhoto) {
     const std::size_t middle = red.size() / 2;
     for (std::size_t i = 0; i < red.size(); ++i) {
       if (i + 2 > middle && i < middle + 2) continue;
-      EXPECT_EQ(red[i] != std::byte{0}, i < middle) << i;
-      EXPECT_EQ(blue[i] != std::byte{0}, i >= middle) << i;
+      // JPEG leaves a little of the other colour.
+      EXPECT_EQ(red[i] > std::byte{60}, i < middle) << i;
+      EXPECT_EQ(blue[i] > std::byte{60}, i >= middle) << i;
     }
   }
   ASSERT_EQ(convert({}).exit_code, 0);
