@@ -25,11 +25,14 @@ void add_common_options(CommandLine& line, CommonOptions& options) {
   line.flag("-v,--verbose", "Say more, on standard error", options.verbose);
 }
 
-void add_work_options(CommandLine& line, WorkOptions& options) {
+void add_threads_option(CommandLine& line, int& threads) {
   line.group("Work");
-  line.option(
-      "-j,--threads", "N", "Threads, 1 to 1024 (default: all cores); the result does not depend on it",
-      [&](const std::string& text) { options.threads = static_cast<int>(parse_whole_number(text, 1, kMaxThreads)); });
+  line.option("-j,--threads", "N", "Threads, 1 to 1024 (default: all cores); the result does not depend on it",
+              [&](const std::string& text) { threads = static_cast<int>(parse_whole_number(text, 1, kMaxThreads)); });
+}
+
+void add_work_options(CommandLine& line, WorkOptions& options) {
+  add_threads_option(line, options.threads);
   line.option("--progress", "MODE",
               "auto: a bar on a terminal, plain lines with -v, else nothing; plain: lines; json: one object a line; "
               "none. On standard error (default auto)",

@@ -28,6 +28,8 @@ struct WorkOptions {
   ProgressMode progress = ProgressMode::kAuto;
 };
 
+/// -j alone.
+void add_threads_option(CommandLine& line, int& threads);
 /// -j, --progress.
 void add_work_options(CommandLine& line, WorkOptions& options);
 

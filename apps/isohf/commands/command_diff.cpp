@@ -52,13 +52,11 @@ std::optional<DiffCommand> parse_diff(const Arguments& arguments) {
   line.option("--raster", "RASTER",
               "Write SECOND minus FIRST at the places of FIRST's source samples (.tif, .exr, ...)", options.raster);
   line.flag("--overwrite", "Replace RASTER where it exists", options.overwrite);
-  add_work_options(line, options.work);
-  add_memory_option(line, options.work);
+  add_threads_option(line, options.work.threads);
   add_common_options(line, options.common);
   line.footer(kDiffFooter);
   if (!line.parse(arguments)) return std::nullopt;
   if (options.archives.size() != 2) line.fail(fmt::format("found {} archives, must be two", options.archives.size()));
-  options.work.scratch_folder = scratch_folder_for(options.raster);
   return options;
 }
 
@@ -133,7 +131,6 @@ void write_difference(const DiffCommand& options, const Job& job) {
                             usual_remedy(options.raster, mapping, {}, RestoreMethod::kBarycentric)};
   RasterSpec spec = raster_spec(metadata, grid, mapping, void_value);
   spec.overwrite = options.overwrite;
-  spec.scratch = scratch_of(options.work);
   const auto sink = create_raster(options.raster, spec);
   SampleStore::Result counts;
   const auto take = [&](std::int64_t row, std::span<const double> difference) {

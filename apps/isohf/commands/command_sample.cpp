@@ -101,9 +101,7 @@ std::optional<SampleOptions> parse_sample(const Arguments& arguments) {
               [&](const std::string& text) { options.sun.elevation_deg = parse_altitude(text); });
   line.option("--above", "H", "Height above the surface that the sun is seen from, vertical units (default 0)",
               [&](const std::string& text) { options.above = parse_height(text); });
-  line.group("Work");
-  line.option("-j,--threads", "N", "Threads, 1 to 1024 (default: all cores); the result does not depend on it",
-              [&](const std::string& text) { options.threads = static_cast<int>(parse_whole_number(text, 1, 1024)); });
+  add_threads_option(line, options.threads);
   add_common_options(line, options.common);
   line.footer(kSampleFooter);
   if (!line.parse(arguments)) return std::nullopt;

@@ -32,7 +32,7 @@ READERS = {"export": ("bilinear", ["export", "IN", "OUT.npy"]),
            "info": ("bilinear", ["info", "IN"]),
            "extract": ("bilinear", ["extract", "IN", "-o", "OUT.isohf", "--tiles", "0:9,0:1"]),
            "extract --plane 1": ("bilinear", ["extract", "IN", "-o", "OUT.isohf", "--plane", "1"])}
-WITHOUT_LIMIT = {"info", "sample, 1,000,000 places", "extract", "extract --plane 1"}  # which hold as little whatever the width
+WITHOUT_LIMIT = {"info", "diff", "diff --surface", "diff --raster", "sample, 1,000,000 places", "extract", "extract --plane 1"}  # which hold as little whatever the width
 DIFFER = 3  # what diff and verify end with where there is something to tell
 
 
