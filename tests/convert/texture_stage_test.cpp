@@ -43,7 +43,7 @@ ConvertOptions options_for(MemoryPhoto& photo, TextureFormat format = TextureFor
   options.overwrite = true;
   options.producer = "isohf test";
   options.z_range = {-30.0, 30.0};
-  options.texture = TextureRequest{&photo, format, 64, 90};
+  options.texture = TextureRequest{&photo, format, 64};
   return options;
 }
 
@@ -186,7 +186,7 @@ TEST(TextureStage, ChoosesTexelsNoCoarserThanPixels) {
   const Plan plan = make_plan(source.info(), options.plan);
   const auto size_for = [&](int pixels, int most) {
     MemoryPhoto photo(pixels, pixels, 1, [](auto, auto, int) { return 9; });
-    const TextureStage stage = TextureStage::make(plan, source.info(), TextureRequest{&photo, {}, most, 90}, 1, 1);
+    const TextureStage stage = TextureStage::make(plan, source.info(), TextureRequest{&photo, {}, most}, 1, 1);
     EXPECT_GE(photo.cache_bytes, 64U << 20U);
     EXPECT_GT(stage.memory_bytes(), 100000000U);
     const double spans = 2.0 * stage.pixels_per_texel();
@@ -208,11 +208,6 @@ TEST(TextureStage, RefusesOptionsOutOfRange) {
     ConvertOptions options = options_for(photo);
     options.texture->max_size = size;
     EXPECT_THAT(message_of([&] { (void)run(source, folder / "a.isohf", options); }), HasSubstr("`max_size`"));
-  }
-  for (const int quality : {0, 101}) {
-    ConvertOptions options = options_for(photo);
-    options.texture->jpeg_quality = quality;
-    EXPECT_THAT(message_of([&] { (void)run(source, folder / "a.isohf", options); }), HasSubstr("`jpeg_quality`"));
   }
   EXPECT_TRUE(folder.names().empty());
 }
@@ -355,7 +350,7 @@ TEST(TextureStage, WillNotResumeWithAnotherTexture) {
   EXPECT_THROW((void)run(source, folder / "cut.isohf", options), Error);
   options.texture->photo = &photo;
   options.resume = true;
-  options.texture->jpeg_quality = 91;
+  options.texture->max_size = 128;
   EXPECT_THAT(message_of([&] { (void)run(source, folder / "cut.isohf", options); }), HasSubstr("other options"));
 }
 

@@ -22,7 +22,6 @@ constexpr std::size_t kBufferBytes = 1 << 16;
 constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
     {"acquisition", "--acquisition"},
     {"bbox", "--bbox"},
-    {"budget", "--shape"},
     {"channel", "--channel"},
     {"clamp_range", "--clamp-range"},
     {"code_type", "--type"},

@@ -60,7 +60,6 @@ struct TextureRequest {
   PhotoSource* photo = nullptr;         ///< must outlive the conversion
   std::optional<TextureFormat> format;  ///< nullopt: JPEG; PNG where the photo has alpha or is a part
   int max_size = 1024;                  ///< texels on a side at most: a power of two, 64...4096
-  int jpeg_quality = 90;                ///< 1...100
 };
 
 /// What an archive says of its source beyond what the source itself says.

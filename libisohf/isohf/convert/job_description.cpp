@@ -1,4 +1,5 @@
 #include "isohf/convert/job_description.h"
+#include "isohf/convert/stages/texture_stage.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -148,7 +149,7 @@ std::string fingerprint(const SourceInfo& info, const Plan& plan, const ConvertO
                        std::filesystem::path(photo.path).filename().string(), known ? status.st_size : 0,
                        known ? status.st_mtim.tv_sec : 0, known ? status.st_mtim.tv_nsec : 0, photo.width, photo.height,
                        photo.channels, texture.format ? to_string(*texture.format) : "auto", texture.max_size,
-                       texture.jpeg_quality);
+                       kTextureQuality);
     if (photo.georeference) {
       job += fmt::format(" at {} {} step {} {}", photo.georeference->origin_x, photo.georeference->origin_y,
                          photo.georeference->spacing_x, photo.georeference->spacing_y);

@@ -29,10 +29,6 @@ void check(const TextureRequest& request, const PhotoInfo& photo) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("`max_size` is {}, must be a power of two from {} to {}",
                                                          request.max_size, kMinTextureSize, kMaxTextureSize));
   }
-  if (request.jpeg_quality < 1 || request.jpeg_quality > 100) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("`jpeg_quality` is {}, must be from 1 to 100", request.jpeg_quality));
-  }
   if (photo.channels != 1 && photo.channels != 3 && photo.channels != 4) {
     throw Error(ErrorCode::kUnsupported,
                 fmt::format("{}: has {} channels; grey, RGB and RGBA are read", photo.path, photo.channels));
@@ -61,7 +57,7 @@ TextureInfo describe(const Plan& plan, const TextureRequest& request, const Phot
   info.channels = info.format == TextureFormat::kJpeg ? std::min(photo.channels, 3) : photo.channels;
   info.size = choose_size(plan.grid, placement.frame, request.max_size);
   while ((info.size >> info.levels) >= kCoarsestTextureSize) ++info.levels;
-  info.quality = request.jpeg_quality;
+  info.quality = kTextureQuality;
   info.photo_name = std::filesystem::path(photo.path).filename().string();
   info.photo_format = photo.format;
   info.photo_width = photo.width;

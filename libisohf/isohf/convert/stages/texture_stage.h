@@ -15,6 +15,9 @@
 
 namespace isohf {
 
+/// Of JPEG textures.
+inline constexpr int kTextureQuality = 90;
+
 /// Textures in the pass that makes the tiles. A tile's texture depends on the photo alone; its members stand before the
 /// tile, so that a conversion that is resumed goes on at the next tile.
 class TextureStage {
