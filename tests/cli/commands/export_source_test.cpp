@@ -4,19 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <csignal>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "formats/write/raster_sink.h"
-#include "isohf/archive.h"
 #include "support/rasters/plain_tiff.h"
 #include "support/rasters/raster.h"
 #include "support/run_program.h"
-#include "support/sanitizers.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -81,24 +77,6 @@ class ExportAsSource : public testing::Test {
 
   TemporaryFolder folder;
 };
-
-TEST_F(ExportAsSource, SaysInOneLineWhatItWrote) {
-  convert(kCoast);
-  EXPECT_EQ(run("back.tif").out, folder / "back.tif" + ": 512 x 384 samples of int16, 30 x 30 apart\n");
-  const json said = json::parse(run("json.tif", {"--json"}).out);
-  EXPECT_EQ(said.at("method"), "hex");
-  EXPECT_EQ(said.at("voids"), 0);
-  EXPECT_EQ(said.at("clamped"), 0);
-  EXPECT_EQ(said.at("source_samples"), false);
-  convert(kCoast, {"--lossless"});
-  EXPECT_EQ(
-      run("exact.tif").out,
-      folder / "exact.tif" + ": 512 x 384 samples of int16, 30 x 30 apart, the source's own, SHA-256 as stated\n");
-  const json exact = json::parse(run("exact2.tif", {"--json"}).out);
-  EXPECT_EQ(exact.at("method"), "source");
-  EXPECT_EQ(exact.at("source_samples"), true);
-  EXPECT_TRUE(exact.at("voids").is_null());
-}
 
 TEST_F(ExportAsSource, MoreThreadsThanCoresAreNoWordOnStandardError) {
   convert(kCoast);
@@ -223,21 +201,6 @@ TEST_F(ExportAsSource, LikeTakesTheOtherRastersGrid) {
       }
     }
   }
-}
-
-TEST_F(ExportAsSource, WritesEveryFormat) {
-  convert(kPeaks);
-  const Raster source = read_raster(kPeaks);
-  for (const char* name : {"back.tif", "back.exr", "back.png"}) {
-    const Raster back = restore(name);
-    ASSERT_EQ(back.elevations.size(), source.elevations.size());
-    for (std::size_t i = 0; i < back.elevations.size(); i += 37)
-      EXPECT_NEAR(back.elevations[i], source.elevations[i], 2000.0F);
-  }
-  convert(kCoast);
-  const Raster tile = exported("back.hgt", {"--size", "1201x1201"});
-  EXPECT_EQ(tile.info.format, "SRTM HGT");
-  EXPECT_EQ(std::filesystem::file_size(folder / "back.hgt"), std::uintmax_t{2} * 1201 * 1201);
 }
 
 TEST_F(ExportAsSource, ExactSamplesGoIntoEveryFormatThatHoldsThem) {
@@ -435,29 +398,6 @@ TEST_F(ExportAsSource, SaysWhatAFormatHasNoPlaceFor) {
   for (const char* output : {"back.tif", "back.png", "back.exr"}) EXPECT_EQ(run(output, {"-q"}).err, "") << output;
 }
 
-TEST_F(ExportAsSource, WrongUseIsOneClearLine) {
-  expect_refused(run("back.tif"), 1, "a.isohf: cannot open: No such file");
-  write_file(folder / "a.isohf", "no archive");
-  expect_refused(run("back.tif"), 1, "is no isohf archive");
-  expect_refused(run_isohf({"export", kCoast, folder / "back.tif"}), 1, "is no isohf archive");
-  std::filesystem::remove(folder / "a.isohf");
-  convert(kCoast);
-  std::filesystem::copy_file(kCoast, folder / "back.tif");
-  expect_refused(run("back.tif"), 2, "back.tif: exists; --overwrite replaces it");
-  EXPECT_EQ(read_file(folder / "back.tif"), read_file(kCoast));
-  expect_refused(run("a.isohf", {"--overwrite"}), 2, "is the input");
-  expect_refused(run("back.jpg"), 2, "no writer for the extension \".jpg\"");
-  expect_refused(run("none/back.tif"), 1, "none: No such file or directory");
-  expect_refused(run("back.hgt"), 2, "not 512 x 384");
-  expect_refused(run("new.tif", {"--method", "cubic"}), 2, "must be hex, barycentric or average");
-  expect_refused(run("new.tif", {"--size", "0x3"}), 2, "COLUMNSxROWS");
-  expect_refused(run("new.tif", {"--spacing", "-1"}), 2, "a number greater than 0");
-  expect_refused(run("new.tif", {"--spacing", "1e-9"}), 2, "must be wide enough for 2147483648 at most");
-  expect_refused(run("new.tif", {"--like", folder / "none.tif"}), 1, "none.tif: no such file");
-  expect_refused(run("new.tif", {"--like", kCoast, "--size", "3x3"}), 2, "--like excludes --size");
-  EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.isohf", "back.tif"}));
-}
-
 TEST_F(ExportAsSource, FullDiskLeavesNothing) {
   convert(kPeaks, {"--lossless"});
   RunOptions full;
@@ -495,61 +435,6 @@ TEST_F(ExportAsSource, DamageToWhatLosslessKeptNamesTheMemberAndWritesNothing) {
   damage_member(folder / "a.isohf", "tiles/0/1.tile");
   expect_refused(run("back.tif"), 1, "tile (1,0)");
 }
-
-TEST_F(ExportAsSource, LosslessBytesDoNotDependOnThreadsOrMemory) {
-  convert(kCoast, {"--lossless", "--shape", "36x35", "--levels", "3"});
-  const std::string one = read_file(folder / "a.isohf");
-  for (const std::vector<std::string>& more :
-       {std::vector<std::string>{"-j", "1"}, {"-j", "7"}, {"--memory", "4G"}, {"-j", "2", "--memory", "500M"}}) {
-    std::vector<std::string> all = {"--lossless", "--shape", "36x35", "--levels", "3"};
-    all.insert(all.end(), more.begin(), more.end());
-    convert(kCoast, all);
-    EXPECT_TRUE(read_file(folder / "a.isohf") == one) << testing::PrintToString(more);
-  }
-  (void)exported("back.tif");
-  const std::string back = read_file(folder / "back.tif");
-  (void)exported("back.tif", {"-j", "1"});
-  EXPECT_TRUE(read_file(folder / "back.tif") == back);
-}
-
-class LosslessInterrupt : public ExportAsSource, public testing::WithParamInterface<const char*> {};
-
-TEST_P(LosslessInterrupt, ResumingGivesTheSameBytes) {
-  const auto command = [&](const std::string& output, bool resume) {
-    // With little memory a pass has several parts, and what it has done is told between them.
-    std::vector<std::string> all = {isohf_path(),    "convert",    folder / "big.tif",
-                                    folder / output, "--lossless", "--progress",
-                                    "json",          "--memory",   "60M"};
-    if (resume) all.emplace_back("--resume");
-    return all;
-  };
-  // A pass that is over before the signal arrives needs a larger raster.
-  RunResult stopped;
-  for (std::uint32_t rows = kSanitized ? 1000 : 2000; stopped.exit_code != 130; rows *= 2) {
-    ASSERT_LE(rows, 32000U) << stopped.err;
-    std::filesystem::remove(folder / "a.isohf");
-    std::uint32_t state = 1;
-    write_int16_tiff(folder / "big.tif", 1500, rows, [&](std::int64_t c, std::int64_t r) {
-      state = state * 1664525U + 1013904223U;
-      return static_cast<std::int16_t>(500.0 * std::sin(static_cast<double>(c + r) * 0.01) + (state >> 29U));
-    });
-    RunningProgram program(command("a.isohf", false));
-    ASSERT_TRUE(program.wait_for_error_text(std::string("\"progress\":\"") + GetParam() + "\""));
-    program.send(SIGINT);
-    stopped = program.wait();
-    ASSERT_TRUE(stopped.exit_code == 130 || stopped.exit_code == 0) << stopped.err;
-  }
-  EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.isohf.part", "a.isohf.part.journal", "big.tif"}));
-  const RunResult resumed = run_program(command("a.isohf", true));
-  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
-  ASSERT_EQ(run_program(command("straight.isohf", false)).exit_code, 0);
-  EXPECT_TRUE(read_file(folder / "a.isohf") == read_file(folder / "straight.isohf"));
-  (void)exported("back.tif");
-  const auto samples = [](const std::string& path) { return read_raster(path).elevations; };
-  EXPECT_TRUE(samples(folder / "back.tif") == samples(folder / "big.tif"));
-}
-
-INSTANTIATE_TEST_SUITE_P(InEachPass, LosslessInterrupt, testing::Values("tiles", "residuals"));
 
 }  // namespace
 }  // namespace isohf::test

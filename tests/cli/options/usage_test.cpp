@@ -133,7 +133,7 @@ TEST(Usage, BashCompletesEveryCommandOptionAndWord) {
     const std::set<std::string> offered = long_options_in(completions_of(" " + command + " --", 2));
     EXPECT_EQ(offered, options_described_in(help)) << command;
   }
-  EXPECT_EQ(completions_of(" restore --method h", 3), "hex\n");
+  EXPECT_EQ(completions_of(" export --method h", 3), "hex\n");
   EXPECT_EQ(completions_of(" shade --palette g", 3), "gray\n");
   // Of convert and plan it is a flag.
   EXPECT_EQ(completions_of(" convert --fit interpol", 3), "\n");

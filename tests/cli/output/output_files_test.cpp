@@ -147,26 +147,5 @@ TEST_F(OutputFiles, ProgressNeverGoesIntoTheOutput) {
   EXPECT_EQ(read_file(folder / "closed.tif"), read_file(folder / "good.tif"));
 }
 
-TEST_F(OutputFiles, UsageErrorsOfEveryWriterExitWithTwo) {
-  for (const std::string command : {"export", "shade"}) {
-    expect_refused({command, "a.isohf", "x.gif"}, "x.gif: no writer for the extension \".gif\"");
-    expect_refused({command, "a.isohf", "x"}, "no writer for the extension");
-  }
-  expect_refused({"export", "a.isohf", "x.png", "--type", "f32"}, "PNG stores uint8 and uint16, not float32");
-  expect_refused({"export", "a.isohf", "x.hgt"}, "an HGT tile has");
-}
-
-TEST_F(OutputFiles, AFullDiskIsToldWithTheFileAndTheCause) {
-  RunOptions options;
-  options.folder = folder.path();
-  options.file_size_limit_bytes = 4000;
-  const RunResult full = run_isohf({"export", "a.isohf", "x.tif"}, options);
-  EXPECT_EQ(full.exit_code, 1);
-  EXPECT_THAT(full.err, HasSubstr("isohf: x.tif: cannot write"));
-  EXPECT_THAT(full.err, HasSubstr("File too large"));
-  EXPECT_THAT(full.err, Not(HasSubstr("scanline")));
-  EXPECT_FALSE(std::filesystem::exists(folder / "x.tif.part"));
-}
-
 }  // namespace
 }  // namespace isohf::test

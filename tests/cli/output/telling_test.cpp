@@ -50,42 +50,6 @@ json error_of(const std::vector<std::string>& arguments, int exit_code) {
   return error;
 }
 
-TEST(JsonError, IsADocumentForAWrongCommandLine) {
-  EXPECT_EQ(error_of({"convert", "--json"}, 2).at("code"), "invalid-argument");
-  EXPECT_EQ(error_of({"convert", "a", "b", "--densty", "1", "--json"}, 2).at("where"), "convert");
-  EXPECT_EQ(error_of({"cnvert", "--json"}, 2).at("code"), "invalid-argument");
-}
-
-TEST(JsonError, SaysWhatAnOptionWasAndMustBe) {
-  const json error = error_of({"convert", "a", "b", "--effort", "77", "--json"}, 2);
-  EXPECT_EQ(error.at("where"), "convert: --effort");
-  EXPECT_EQ(error.at("found"), "'77'");
-  EXPECT_EQ(error.at("required"), "fast, default or best");
-}
-
-TEST(JsonError, NamesTheFileThatIsMissingExistsOrIsUnknown) {
-  const TemporaryFolder folder;
-  const Rasters rasters(folder);
-  const json missing = error_of({"convert", folder / "none.tif", rasters.out, "--json"}, 1);
-  EXPECT_EQ(missing.at("code"), "io");
-  EXPECT_EQ(missing.at("where"), folder / "none.tif");
-  EXPECT_EQ(missing.at("found"), "no such file");
-  write_text(rasters.out, "mine");
-  const json other = error_of({"convert", rasters.plain, rasters.out, "--json"}, 2);
-  EXPECT_EQ(other.at("where"), rasters.out);
-  EXPECT_EQ(other.at("found"), "exists and is no isohf archive");
-  EXPECT_THAT(other.at("remedy").get<std::string>(), HasSubstr("choose another name"));
-  std::filesystem::remove(rasters.out);
-  ASSERT_EQ(run_isohf({"convert", rasters.plain, rasters.out}).exit_code, 0);
-  const json exists = error_of({"convert", rasters.plain, rasters.out, "--json"}, 2);
-  EXPECT_EQ(exists.at("where"), rasters.out);
-  EXPECT_EQ(exists.at("found"), "exists");
-  EXPECT_THAT(exists.at("remedy").get<std::string>(), HasSubstr("--overwrite"));
-  const std::string text = folder / "notes.txt";
-  write_text(text, "no raster");
-  EXPECT_EQ(error_of({"info", text, "--json"}, 1).at("where"), text);
-}
-
 TEST(JsonError, SaysBothSizesOfAFileOfTheWrongSize) {
   const TemporaryFolder folder;
   const std::string raw = folder / "a.raw";
@@ -130,27 +94,7 @@ TEST(JsonError, NamesTheByteOfADamagedArchive) {
   EXPECT_THAT(error.at("where").get<std::string>(), HasSubstr("at byte "));
 }
 
-TEST(JsonError, OfAFileAmongManyIsThatOfTheFileAlone) {
-  const TemporaryFolder folder;
-  const Rasters rasters(folder);
-  ASSERT_EQ(run_isohf({"convert", rasters.plain, rasters.out}).exit_code, 0);
-  for (const char* command : {"info", "verify"}) {
-    SCOPED_TRACE(command);
-    const std::string missing = folder / "none.isohf";
-    const json alone = error_of({command, missing, "--json"}, 1);
-    EXPECT_EQ(alone.at("where"), missing);
-    const RunResult many = run_isohf({command, rasters.out, missing, "--json"});
-    EXPECT_EQ(many.exit_code, 1);
-    std::istringstream lines(many.out);
-    std::string line;
-    std::getline(lines, line);
-    EXPECT_FALSE(json::parse(line).contains("error"));
-    std::getline(lines, line);
-    EXPECT_EQ(json::parse(line), (json{{"file", missing}, {"error", alone}}));
-  }
-}
-
-TEST(JsonFiles, AreAllThatRestoreExportAndShadeWrote) {
+TEST(JsonFiles, AreAllThatExportAndShadeWrote) {
   const TemporaryFolder folder;
   const Rasters rasters(folder);
   ASSERT_EQ(run_isohf({"convert", rasters.plain, rasters.out}).exit_code, 0);
