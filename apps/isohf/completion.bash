@@ -32,7 +32,7 @@ _isohf() {
     *' --acquisition') values='point box gaussian:' ;;
     *' --overlap') values='last first' ;;
     *' --outside') values='cover clamp void' ;;
-    'export --type') values='u8 u16 i16 i32 f16 f32 f64' ;;
+    'export --type') values='u8 u16 i16 u32 i32 f16 f32 f64' ;;
     *' --type') values='u16 u8 f32' ;;
     *' --encoding') values='terrarium mapbox rgba-float' ;;
     *' --registration') values='area point auto' ;;

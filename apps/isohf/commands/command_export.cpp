@@ -425,6 +425,9 @@ class Exporter {
   SampleMapping source_mapping() {
     const Metadata& metadata = archive_.metadata();
     const SampleMapping found{options_.written_type(metadata), metadata.source.z_scale, metadata.source.z_offset};
+    if (found.type == SampleType::kFloat16 && sample_type_from_string(metadata.source.sample_type) != found.type) {
+      warn_of_halves(options_.output, metadata);
+    }
     if (!takes_decimals(metadata, found)) return found;
     if (has_scale(options_.output)) return spread_over_range(found.type);
     warn_of_whole_numbers(options_.output, metadata);

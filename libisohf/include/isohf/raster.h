@@ -161,7 +161,7 @@ struct OpenOptions {
   std::optional<double> spacing;  ///< sample spacing in metres, for files that do not say; overrides
   /// "EPSG:2154", WKT, a PROJ string: what the coordinates are in; overrides. Understood by the PROJ module.
   std::string reference_system;
-  std::optional<RawLayout> raw;   ///< the file is nothing but these samples, whatever its name and content say
+  std::optional<RawLayout> raw;  ///< the file is nothing but these samples, whatever its name and content say
   /// What all files that are open at once may hold of the contents that they have packed (.gz, .zip): contents that
   /// do not fit are unpacked piece by piece whenever they are read.
   std::uint64_t unpacked_bytes = std::uint64_t{256} << 20U;

@@ -133,7 +133,8 @@ TEST_F(ExportCommand, IsReadByGdalWithTheSamePlaceAndElevations) {
   ASSERT_EQ(run_isohf({"convert", kVoids, folder_ / "voids.isohf", "-q"}).exit_code, 0);
   int checked = 0;
   for (const std::string archive : {"coast.isohf", "voids.isohf"}) {
-    for (const std::vector<std::string>& options : {std::vector<std::string>{"--method", "hex"}, {"--size", "300x200"}}) {
+    for (const std::vector<std::string>& options :
+         {std::vector<std::string>{"--method", "hex"}, {"--size", "300x200"}}) {
       for (const std::string extension : {".tif", ".flt", ".asc", ".png"}) {
         const std::string name = "g" + std::to_string(++checked) + extension;
         SCOPED_TRACE(archive + " " + name);

@@ -207,7 +207,7 @@ TEST_F(ExportAsSource, ExactSamplesGoIntoEveryFormatThatHoldsThem) {
   convert(kVoids, {"--lossless"});
   const Raster source = read_raster(kVoids);
   for (const char* name : {"back.tif", "back.exr"}) {
-    const Raster back = restore(name);
+    const Raster back = exported(name);
     ASSERT_EQ(back.elevations.size(), source.elevations.size());
     for (std::size_t i = 0; i < back.elevations.size(); ++i) {
       // OpenEXR has no void value: there voids are NaN.

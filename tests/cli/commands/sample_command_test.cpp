@@ -43,8 +43,8 @@ TEST_F(SampleCommand, ShadowsReachAsHighAsTheEdgeTowardsTheSunLetsThem) {
   const std::string archive = folder / "plane.isohf";
   const double surface = 1000.0 + kSlopeX * 1000.0 + kSlopeZ * 1000.0;
   const double edge = surface + kSlopeX * 990.0 - 990.0 * std::tan(8.0 * 0.017453292519943295);
-  const std::vector<std::string> sun = {"sample",   archive,     "--at", "1000",       "1000",
-                                        "--shadow", "--azimuth", "E",    "--sun-elevation", "8"};
+  const std::vector<std::string> sun = {"sample", archive,           "--at", "1000", "1000", "--shadow", "--azimuth",
+                                        "E",      "--sun-elevation", "8"};
   const auto with = [&](const std::vector<std::string>& more) {
     std::vector<std::string> arguments = sun;
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -80,7 +80,8 @@ TEST_F(SampleCommand, RefusesASunThatCastsNoShadow) {
   using testing::HasSubstr;
   EXPECT_THAT(refused({"--above", "3"}), HasSubstr("--above is for --shadow, which is not given"));
   EXPECT_THAT(refused({"--shadow", "--above", "-3"}), HasSubstr("must be 0 or more"));
-  EXPECT_THAT(refused({"--shadow", "--sun-elevation", "90"}), HasSubstr("the sun must stand above 0 and below 90 degrees"));
+  EXPECT_THAT(refused({"--shadow", "--sun-elevation", "90"}),
+              HasSubstr("the sun must stand above 0 and below 90 degrees"));
   EXPECT_THAT(refused({"--shadow", "--azimuth", "NW"}), HasSubstr("must be degrees from 0 to 360, or N, E, S, W"));
 }
 

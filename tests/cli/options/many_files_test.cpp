@@ -90,7 +90,8 @@ TEST_F(ManyFiles, FoldersPatternsAndListsAreTaken) {
   EXPECT_THAT(archives({folder / "in/*.isohf", folder / "in/deeper/c.isohf"}), ElementsAre("a.isohf", "c.isohf"));
   write_file(folder / "list.txt", std::string_view("in/deeper/c.isohf\nin/a.isohf\n"));
   EXPECT_THAT(archives({"@" + (folder / "list.txt")}), ElementsAre("c.isohf", "a.isohf"));
-  EXPECT_EQ(run_isohf({"verify", folder / "in/a.isohf", folder / "in/deeper/c.isohf", "--against", kRaster}).exit_code, 2);
+  EXPECT_EQ(run_isohf({"verify", folder / "in/a.isohf", folder / "in/deeper/c.isohf", "--against", kRaster}).exit_code,
+            2);
 }
 
 TEST_F(ManyFiles, DataOfEnviAreRastersOfAFolderWhereTheirHeaderIsThere) {

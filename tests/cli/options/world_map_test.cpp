@@ -63,8 +63,7 @@ TEST(WorldMap, ARasterAcrossTheCutOfItsOwnMapIsWholeOnAnother) {
   const RunResult made = run_isohf({"convert", folder / "a.flt", folder / "a.isohf", "--crs", "EPSG:4087",
                                     "--projection", "transverse-mercator", "--type", "f32"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
-  const RunResult verified =
-      run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.flt", "--json"});
+  const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.flt", "--json"});
   EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
   EXPECT_NE(verified.out.find("\"samples_compared\": 5500"), std::string::npos) << verified.out;
 }

@@ -80,8 +80,7 @@ TEST_F(ZRange, BothEndsHoldWhateverTheStepAndTheType) {
     const json metadata = json::parse(result.out).at("metadata");
     EXPECT_EQ(metadata.at("samples").at("range"), json({0.0, 100.0})) << named;
     EXPECT_GT(metadata.at("statistics").at("voids").get<int>(), 0) << named;
-    const RunResult verified =
-        run_isohf({"verify", folder / "a.isohf", "--against", folder / "slope.tif", "--json"});
+    const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--against", folder / "slope.tif", "--json"});
     EXPECT_EQ(verified.exit_code, 0) << named << verified.out;
   }
 }
