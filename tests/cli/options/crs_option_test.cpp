@@ -134,15 +134,15 @@ TEST_F(CrsOption, GroundBesideAPoleThatIsALineKeepsItsLongitudes) {
   EXPECT_NEAR(bounds.at("east").get<double>(), 200000.0 / 111319.49, 1e-4);
 }
 
-TEST_F(CrsOption, RestoreToTheArchivesOwnSystemAddsNoBorder) {
+TEST_F(CrsOption, ExportToTheArchivesOwnSystemAddsNoBorder) {
   ASSERT_EQ(convert("EPSG:32611").err, "");
-  ASSERT_EQ(run_isohf({"export", archive_, folder_ / "plain.asc", "--quiet"}).err, "");
+  ASSERT_EQ(run_isohf({"export", archive_, folder_ / "plain.asc", "--method", "hex", "--quiet"}).err, "");
   ASSERT_EQ(run_isohf({"export", archive_, folder_ / "own.asc", "--crs", "EPSG:32611", "--quiet"}).err, "");
   EXPECT_EQ(read_text(folder_ / "own.asc"), read_text(folder_ / "plain.asc"));
 }
 
 /// Of degrees that have no code, in words of other programs: the same, without a datum's name, by the ellipsoid alone.
-TEST_F(CrsOption, RestoreToTheArchivesOwnDegreesAddsNoBorderHoweverTheyAreSpelled) {
+TEST_F(CrsOption, ExportToTheArchivesOwnDegreesAddsNoBorderHoweverTheyAreSpelled) {
   const auto degrees = [](const std::string& name, const std::string& datum, const std::string& ellipsoid) {
     return "GEOGCS[\"" + name + "\",DATUM[\"" + datum + "\",SPHEROID[\"s\"," + ellipsoid +
            "]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]]";
