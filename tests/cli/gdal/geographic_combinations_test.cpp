@@ -91,17 +91,15 @@ struct Combination {
   Words more;
   std::string step = "0.01";
 
-  [[nodiscard]] Words source_options(const TemporaryFolder& folder) const {
-    Words words;
+  [[nodiscard]] Words geoid_option(const TemporaryFolder& folder) const {
+    return geoid ? Words{"--geoid", folder / "geoid.pgm"} : Words{};
+  }
+  [[nodiscard]] Words options(const TemporaryFolder& folder) const {
+    Words words = geoid_option(folder);
     if (box) {
       words.insert(words.end(), {"--bbox", std::to_string((*box)[0]) + "," + std::to_string((*box)[1]) + "," +
                                                std::to_string((*box)[2]) + "," + std::to_string((*box)[3])});
     }
-    if (geoid) words.insert(words.end(), {"--geoid", folder / "geoid.pgm"});
-    return words;
-  }
-  [[nodiscard]] Words options(const TemporaryFolder& folder) const {
-    Words words = source_options(folder);
     words.insert(words.end(), {"--projection", kind, "--step", step});
     if (fill) words.insert(words.end(), {"--fill", "--fill-distance", "10"});
     words.insert(words.end(), more.begin(), more.end());
@@ -139,7 +137,8 @@ class GeographicCombinations : public testing::Test {
     EXPECT_EQ(ArchiveReader(folder / "whole.isohf").metadata().content_sha256,
               ArchiveReader(folder / "a.isohf").metadata().content_sha256);
     for (const std::string& input : {folder / "whole.flt", folder / "pieces"}) {
-      const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--against", input, "--json"});
+      const RunResult verified =
+          run_with({"verify", folder / "a.isohf", "--against", input, "--json"}, at.geoid_option(folder));
       ASSERT_EQ(verified.exit_code, 0) << verified.out << verified.err;
       const json against = json::parse(verified.out).at("against");
       EXPECT_EQ(against.at("vertices").at("wrong"), 0);
