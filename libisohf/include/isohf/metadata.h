@@ -49,12 +49,12 @@ struct WorldBounds {
   double z1 = 0.0;
 };
 
-/// Elevation statistics over the stored lattice vertices, each shared vertex counted once a tile that shows it.
+/// Elevation statistics over the stored vertices on the source's ground, each shared vertex counted once.
 struct Statistics {
   std::optional<double> min;  ///< vertical units; absent where every vertex is void
   std::optional<double> max;
   std::optional<double> mean;
-  std::int64_t vertices = 0;    ///< visible vertices of all tiles
+  std::int64_t vertices = 0;    ///< that count
   std::int64_t voids = 0;       ///< of these, void
   std::int64_t clamped = 0;     ///< elevations outside the range asked for that were moved to its end
   double worst_rounding = 0.0;  ///< largest |stored - computed| elevation, vertical units
