@@ -102,8 +102,7 @@ std::optional<ShadeCommand> parse_shade(const Arguments& arguments) {
   line.option("--azimuth", "DEG",
               "Where the sun stands, clockwise from North; N, E, S or W (default 270; --hillshade 315)",
               [&](const std::string& text) { options.azimuth = parse_azimuth(text); });
-  line.option("--sun-elevation", "DEG",
-              "Height of the sun above the horizon, 0.01 to 90 (default 15; --hillshade 45)",
+  line.option("--sun-elevation", "DEG", "Height of the sun above the horizon, 0.01 to 90 (default 15; --hillshade 45)",
               [&](const std::string& text) { options.elevation = parse_altitude(text); });
   line.option("--date", "YYYY-MM-DD", "The sun of that day over the archive's middle (Earth and Mars)",
               [&](const std::string& text) {

@@ -6,7 +6,6 @@
 #include <limits>
 #include <map>
 
-
 namespace isohf::view {
 namespace {
 
@@ -123,7 +122,6 @@ void verify_mesh(const SharedGeometry& shared, ViewReport& report) {
 
 ViewReport verify_view(const TileSource& source, const IndexArrays& arrays, const ViewChecks& options) {
   const TileGrid& grid = source.grid();
-  const isohf::TileRange all{{0, 0}, {grid.tile_columns(), grid.tile_rows()}};
   ViewReport report;
   const SharedGeometry shared(grid.shape(), arrays);
   MeshOracle oracle(grid.shape());

@@ -551,7 +551,6 @@ VerifyReport verify_archive(const std::string& path, const Job& job, std::size_t
   try {
     archive = std::make_unique<ArchiveReader>(path);
     check_statistics_of(archive->metadata());
-    (void)counts_source_ground(archive->metadata());
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kIo || error.code() == ErrorCode::kInvalidArgument) throw;
     VerifyReport report;

@@ -352,7 +352,8 @@ TEST(ExportWithoutAPlace, PutsTilesAndGridsBesideEachOther) {
     if (ending == ".asc" || ending == ".flt") continue;  // which always have a place
     EXPECT_FALSE(read_raster(folder / ("whole" + ending)).info.georeference.has_origin);
   }
-  (void)done({"export", folder / "whole.isohf", folder / "tile.asc", "--size", "100x100", "--tile-size", "50", "--json"});
+  (void)done(
+      {"export", folder / "whole.isohf", folder / "tile.asc", "--size", "100x100", "--tile-size", "50", "--json"});
   EXPECT_NEAR(read_raster(folder / "tile_x0_y0.asc").info.georeference.origin_x,
               read_raster(folder / "whole.asc").info.georeference.origin_x, 2.0);
 }

@@ -160,9 +160,7 @@ void Assembly::add_plane_rows(std::int64_t row) {
 
 std::uint64_t Assembly::add_residuals(const LosslessRecord& record) {
   const ArchiveReader& first = shards_.front().file->archive();
-  for (const char* const name : {kNodesName, kPositionsName}) {
-    if (first.find_member(name)) copy_member(first, name);
-  }
+  if (first.find_member(kNodesName)) copy_member(first, kNodesName);
   const std::int64_t members = (record.height + record.rows_per_member - 1) / record.rows_per_member;
   std::uint64_t bytes = 0;
   const AssemblyInput* before = &shards_.front();
