@@ -353,7 +353,7 @@ TEST_F(Shards, AllThatIsWrongIsSaidBeforeAnythingIsWritten) {
   test::write_file(folder / "bit.isohf", bytes);
   const std::vector<std::string> four = make_shards(source, 4, "four-");
   const std::string whole = make("whole.isohf");
-  options.level = 2;
+  options.effort = Effort::kFast;
   const std::vector<std::string> foreign = make_shards(source, 3, "other-");
   const std::string found = merged({files[0], files[0], foreign[1], folder / "none.isohf", four[0], whole,
                                     folder / "cut.isohf", folder / "bit.isohf"});
@@ -405,7 +405,7 @@ TEST(TileRange, MeetsAndIsPutAround) {
 
 TEST_F(Parts, DiffDecodesNothingAndListsMetadata) {
   const std::string whole = make("whole.isohf");
-  options.level = 3;
+  options.effort = Effort::kFast;
   const std::string other = make("other.isohf");
   const ArchiveDifference difference = diff_archives(whole, other);
   EXPECT_TRUE(difference.same_tiles());

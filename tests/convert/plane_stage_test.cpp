@@ -6,7 +6,6 @@
 #include <atomic>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <set>
 
@@ -46,11 +45,6 @@ ConvertOptions options_of(CodeType type = CodeType::kU16) {
   options.producer = "isohf test";
   options.z_range = {270.0, 330.0};
   return options;
-}
-
-std::string content(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 std::set<int> findings_in(const std::string& archive) {

@@ -34,12 +34,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::vector<std::string> textures;
   std::vector<std::string> pairs;
   isohf::cli::CommandLine line("convert", "Tries options.");
-  line.positional("input", "-i,--input", "A file", input);
+  line.positional("input", "A file", input);
   line.group("Samples");
   line.option("-f,--filter", "NAME", "A text", filter);
   line.words({"cubic", "bilinear"});
   line.option("--shape", "CxR", "A text", [&](const std::string& text) { shape = text; });
-  line.option_or_numbers("--seeds", "DEGREES", "all", "A list", [&](const std::string& text) { shape = text; });
   line.flag("--overwrite", "A flag", overwrite);
   line.repeated("--texture", "FILE", "Files", textures);
   line.repeated_pair("--at", "X Y", "Places", [&](const std::string& x, const std::string& y) {

@@ -88,7 +88,7 @@ TEST(Illumination, HasNoColourWhereThereIsNoAir) {
        {std::pair{"", true}, {"Earth", true}, {"Mars", true}, {"Moon", false}, {"Ceres", false}}) {
     metadata.source.body = body;
     EXPECT_EQ(has_air(metadata), air) << body;
-    const Illumination low(90.0, 5.0, true, has_air(metadata));
+    const Illumination low(90.0, 5.0, has_air(metadata));
     const Light lit = low.on({0.0F, 1.0F, 0.0F}, 1.0F);
     const Light dark = low.on({0.0F, 1.0F, 0.0F}, 0.0F);
     EXPECT_EQ(lit[0] > lit[2], air) << body;
