@@ -95,7 +95,7 @@ TEST_F(ShardsCommand, AreRefusedByNumberAndOptions) {
   expect_refused({"convert", "land.tif", "-o", "a.isohf", "--shard", "1/3"}, 2,
                  "--shard needs --z-range MIN:MAX, or --type f32, as no shard sees all elevations; isohf info --stats "
                  "INPUT prints their range");
-  for (const Words& more : {Words{"--dry-run"}, {"--resume"}, {"--max-error", "3"}, {"--report"}})
+  for (const Words& more : {Words{"--dry-run"}, {"--resume"}, {"--max-error", "3"}})
     expect_refused(words_of("1/3", "a.isohf", more), 2, more.front() + " has no place with --shard");
   const RunResult floats = run({"convert", "land.tif", "-o", "a.isohf", "--shard", "1/3", "--type", "f32"});
   EXPECT_EQ(floats.exit_code, 0) << floats.err;
@@ -117,7 +117,7 @@ TEST_F(ShardsCommand, AreReadByMergeAndInfoAlone) {
 
 TEST_F(ShardsCommand, AreJoinedOnlyWithTheirOwnAndNothingIsLost) {
   make_shards("p-");
-  make_shards("o-", {"--level", "3"});
+  make_shards("o-", {"--effort", "fast"});
   const std::string kept = read_file(folder / "p-1.isohf");
   expect_refused({"merge", "p-1.isohf", "o-2.isohf", "p-3.isohf", "-o", "a.isohf"}, 2,
                  "o-2.isohf: is a shard of another conversion than p-1.isohf; of 3 shards these are missing: 2");

@@ -118,8 +118,8 @@ TEST(ReferenceSystemOption, TakesNoWordForAName) {
     EXPECT_EQ(convert(name).exit_code, 0) << name;
 }
 
-// A grid whose middle column is an edge of tiles: halves have each sample once, and no void.
-TEST(Parts, SamplesOnTheirEdgeBelongToTheEasternAndTheSouthernOne) {
+// The middle column and row of this grid are edges of tiles: both extracts have them, and no nodata.
+TEST(Extract, SamplesOnAnEdgeOfTilesAreInBothExtracts) {
   const TemporaryFolder folder;
   const auto sample = [](std::int64_t c, std::int64_t r) { return static_cast<float>(c % 7 + r % 5); };
   write_gridfloat(folder / "a", 121, 121, 500000.0, 4000000.0, 30.0, sample, "");
@@ -138,7 +138,7 @@ TEST(Parts, SamplesOnTheirEdgeBelongToTheEasternAndTheSouthernOne) {
     samples += part.info.width * part.info.height;
     EXPECT_EQ(share_of_voids(part), 0.0) << tiles;
   }
-  EXPECT_EQ(samples, 121 * 121);
+  EXPECT_EQ(samples, 122 * 122);
 }
 
 }  // namespace
