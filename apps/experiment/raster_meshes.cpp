@@ -12,9 +12,9 @@
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/restore/archive_geometry.h"
-#include "isohf/surface/resample/prefilter.h"
-#include "isohf/surface/resample/row_sampler.h"
-#include "isohf/surface/source/band_reader.h"
+#include "isohf/sampling/resample/prefilter.h"
+#include "isohf/sampling/resample/row_sampler.h"
+#include "isohf/sampling/source/band_reader.h"
 
 namespace isohf::experiment {
 namespace {

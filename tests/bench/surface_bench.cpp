@@ -18,12 +18,12 @@
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/base/sample.h"
 #include "isohf/raster.h"
-#include "isohf/surface/resample/kernels.h"
-#include "isohf/surface/resample/prefilter.h"
-#include "isohf/surface/resample/tile_resampler.h"
+#include "isohf/sampling/resample/kernels.h"
+#include "isohf/sampling/resample/prefilter.h"
+#include "isohf/sampling/resample/tile_resampler.h"
+#include "isohf/sampling/source/source_statistics.h"
 #include "isohf/surface/shade/normals.h"
 #include "isohf/surface/shade/shadow_hull.h"
-#include "isohf/surface/source/source_statistics.h"
 
 namespace {
 

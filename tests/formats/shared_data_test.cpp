@@ -19,7 +19,7 @@
 #include "formats/registry.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/raster.h"
-#include "isohf/surface/source/source_statistics.h"
+#include "isohf/sampling/source/source_statistics.h"
 #include "support/rasters/samples.h"
 #include "support/real_files.h"
 

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <numeric>
 
-#include "isohf/surface/resample/kernels.h"
+#include "isohf/sampling/resample/kernels.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

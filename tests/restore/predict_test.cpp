@@ -12,7 +12,7 @@
 #include "isohf/restore/predict/place_mesh.h"
 #include "isohf/restore/predict/spline_predictor.h"
 #include "isohf/restore/rows/spline_rows.h"
-#include "isohf/surface/resample/kernels.h"
+#include "isohf/sampling/resample/kernels.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {

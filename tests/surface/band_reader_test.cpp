@@ -1,4 +1,4 @@
-#include "isohf/surface/source/band_reader.h"
+#include "isohf/sampling/source/band_reader.h"
 
 #include <gtest/gtest.h>
 

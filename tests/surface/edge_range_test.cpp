@@ -1,10 +1,10 @@
-#include "isohf/surface/source/edge_range.h"
+#include "isohf/sampling/source/edge_range.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "isohf/surface/source/source_rows.h"
+#include "isohf/sampling/source/source_rows.h"
 #include "support/rasters/memory_source.h"
 
 namespace isohf {

@@ -1,4 +1,4 @@
-#include "isohf/surface/resample/prefilter.h"
+#include "isohf/sampling/resample/prefilter.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

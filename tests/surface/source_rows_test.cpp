@@ -1,4 +1,4 @@
-#include "isohf/surface/source/source_rows.h"
+#include "isohf/sampling/source/source_rows.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "isohf/surface/resample/tile_resampler.h"
+#include "isohf/sampling/resample/tile_resampler.h"
 
 #include <gtest/gtest.h>
 

@@ -6,8 +6,8 @@
 
 #include "isohf/archive.h"
 #include "isohf/convert.h"
-#include "isohf/surface/resample/kernels.h"
-#include "isohf/surface/resample/prefilter.h"
+#include "isohf/sampling/resample/kernels.h"
+#include "isohf/sampling/resample/prefilter.h"
 #include "isohf/verify.h"
 #include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"

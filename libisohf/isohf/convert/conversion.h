@@ -6,10 +6,10 @@
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/convert.h"
 #include "isohf/convert/memory_plan.h"
-#include "isohf/surface/resample/kernels.h"
-#include "isohf/surface/resample/prefilter.h"
-#include "isohf/surface/resample/tile_resampler.h"
-#include "isohf/surface/source/source_statistics.h"
+#include "isohf/sampling/resample/kernels.h"
+#include "isohf/sampling/resample/prefilter.h"
+#include "isohf/sampling/resample/tile_resampler.h"
+#include "isohf/sampling/source/source_statistics.h"
 
 namespace isohf {
 

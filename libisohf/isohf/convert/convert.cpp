@@ -14,7 +14,7 @@
 #include "isohf/convert/run_conversion.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
-#include "isohf/surface/source/source_statistics.h"
+#include "isohf/sampling/source/source_statistics.h"
 
 namespace isohf {
 namespace {

@@ -13,9 +13,9 @@
 #include "isohf/convert/stages/seed_stage.h"
 #include "isohf/convert/stages/texture_stage.h"
 #include "isohf/error.h"
-#include "isohf/surface/resample/kernels.h"
-#include "isohf/surface/resample/prefilter.h"
-#include "isohf/surface/source/band_reader.h"
+#include "isohf/sampling/resample/kernels.h"
+#include "isohf/sampling/resample/prefilter.h"
+#include "isohf/sampling/source/band_reader.h"
 
 namespace isohf {
 namespace {

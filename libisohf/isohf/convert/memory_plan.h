@@ -6,7 +6,7 @@
 #include "isohf/convert.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/raster.h"
-#include "isohf/surface/source/source_rows.h"
+#include "isohf/sampling/source/source_rows.h"
 
 namespace isohf {
 

@@ -2,7 +2,7 @@
 
 #include "isohf/error.h"
 #include "isohf/metadata.h"
-#include "isohf/surface/resample/tile_resampler.h"
+#include "isohf/sampling/resample/tile_resampler.h"
 
 namespace isohf {
 

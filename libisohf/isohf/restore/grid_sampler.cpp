@@ -13,7 +13,7 @@
 #include "isohf/base/handed_in.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
-#include "isohf/surface/resample/kernels.h"
+#include "isohf/sampling/resample/kernels.h"
 
 namespace isohf {
 namespace {

@@ -9,7 +9,7 @@
 #include "isohf/restore/rows/spline_rows.h"
 #include "isohf/restore/rows/vertex_rows.h"
 #include "isohf/restore/sample_grids.h"
-#include "isohf/surface/source/source_band.h"
+#include "isohf/sampling/source/source_band.h"
 
 namespace isohf {
 

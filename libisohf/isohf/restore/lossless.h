@@ -13,8 +13,8 @@
 #include "isohf/restore/predict/place_mesh.h"
 #include "isohf/restore/predict/spline_predictor.h"
 #include "isohf/restore/residual_codec.h"
+#include "isohf/sampling/source/source_band.h"
 #include "isohf/surface.h"
-#include "isohf/surface/source/source_band.h"
 
 namespace isohf {
 

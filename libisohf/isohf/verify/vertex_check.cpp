@@ -12,9 +12,9 @@
 #include "isohf/base/memory/memory_budget.h"
 #include "isohf/error.h"
 #include "isohf/restore/archive_geometry.h"
-#include "isohf/surface/resample/height_error.h"
-#include "isohf/surface/source/band_reader.h"
-#include "isohf/surface/source/source_statistics.h"
+#include "isohf/sampling/resample/height_error.h"
+#include "isohf/sampling/source/band_reader.h"
+#include "isohf/sampling/source/source_statistics.h"
 #include "isohf/verify.h"
 #include "isohf/verify/accuracy/same_source.h"
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "isohf/base/view.h"
-#include "isohf/surface/resample/kernels.h"
-#include "isohf/surface/resample/prefilter.h"
+#include "isohf/sampling/resample/kernels.h"
+#include "isohf/sampling/resample/prefilter.h"
 
 namespace isohf {
 

@@ -7,7 +7,7 @@
 #include "isohf/convert.h"
 #include "isohf/metadata.h"
 #include "isohf/projection/choose_projection.h"
-#include "isohf/surface/resample/tile_resampler.h"
+#include "isohf/sampling/resample/tile_resampler.h"
 
 namespace isohf {
 

@@ -12,9 +12,9 @@
 #include "isohf/convert/stages/choose_quantisation.h"
 #include "isohf/convert/stages/tile_source.h"
 #include "isohf/error.h"
-#include "isohf/surface/resample/height_error.h"
-#include "isohf/surface/source/edge_range.h"
-#include "isohf/surface/source/source_statistics.h"
+#include "isohf/sampling/resample/height_error.h"
+#include "isohf/sampling/source/edge_range.h"
+#include "isohf/sampling/source/source_statistics.h"
 
 namespace isohf {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "isohf/error.h"
-#include "isohf/surface/resample/height_error.h"
+#include "isohf/sampling/resample/height_error.h"
 
 namespace isohf {
 namespace {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "isohf/convert/conversion.h"
-#include "isohf/surface/resample/tile_resampler.h"
-#include "isohf/surface/source/band_reader.h"
-#include "isohf/surface/source/source_rows.h"
+#include "isohf/sampling/resample/tile_resampler.h"
+#include "isohf/sampling/source/band_reader.h"
+#include "isohf/sampling/source/source_rows.h"
 
 namespace isohf {
 

@@ -6,7 +6,7 @@
 
 #include "isohf/archive/codec/tile_codes.h"
 #include "isohf/convert/conversion.h"
-#include "isohf/surface/source/source_band.h"
+#include "isohf/sampling/source/source_band.h"
 
 namespace isohf {
 

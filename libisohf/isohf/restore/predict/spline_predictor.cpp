@@ -11,7 +11,7 @@
 #include "isohf/base/assert.h"
 #include "isohf/base/simd.h"
 #include "isohf/restore/grid_sampler.h"
-#include "isohf/surface/resample/kernels.h"
+#include "isohf/sampling/resample/kernels.h"
 
 namespace isohf {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "isohf/restore/predict/fixed_point.h"
 #include "isohf/restore/rows/vertex_rows.h"
-#include "isohf/surface/source/source_band.h"
+#include "isohf/sampling/source/source_band.h"
 
 namespace isohf {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "isohf/surface/resample/kernels.h"
+#include "isohf/sampling/resample/kernels.h"
 
 namespace isohf {
 namespace {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "isohf/picture.h"
+#include "isohf/sampling/resample/source_warp.h"
 #include "isohf/surface/photo/texture_cutter.h"
-#include "isohf/surface/resample/source_warp.h"
 
 namespace isohf {
 

@@ -1,4 +1,4 @@
-#include "isohf/surface/source/band_reader.h"
+#include "isohf/sampling/source/band_reader.h"
 
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>

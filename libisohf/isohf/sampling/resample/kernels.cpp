@@ -1,4 +1,4 @@
-#include "isohf/surface/resample/kernels.h"
+#include "isohf/sampling/resample/kernels.h"
 
 #include <cmath>
 #include <utility>

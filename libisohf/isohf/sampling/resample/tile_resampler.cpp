@@ -1,4 +1,4 @@
-#include "isohf/surface/resample/tile_resampler.h"
+#include "isohf/sampling/resample/tile_resampler.h"
 
 #include <algorithm>
 #include <array>
@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "isohf/base/assert.h"
-#include "isohf/surface/resample/row_sampler.h"
-#include "isohf/surface/resample/void_rule.h"
+#include "isohf/sampling/resample/row_sampler.h"
+#include "isohf/sampling/resample/void_rule.h"
 
 namespace isohf {
 namespace {

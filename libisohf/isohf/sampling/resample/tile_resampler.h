@@ -6,11 +6,11 @@
 #include <span>
 
 #include "isohf/lattice.h"
-#include "isohf/surface/resample/kernels.h"
-#include "isohf/surface/resample/source_warp.h"
-#include "isohf/surface/source/source_axis.h"
-#include "isohf/surface/source/source_band.h"
-#include "isohf/surface/source/source_statistics.h"
+#include "isohf/sampling/resample/kernels.h"
+#include "isohf/sampling/resample/source_warp.h"
+#include "isohf/sampling/source/source_axis.h"
+#include "isohf/sampling/source/source_band.h"
+#include "isohf/sampling/source/source_statistics.h"
 
 namespace isohf {
 

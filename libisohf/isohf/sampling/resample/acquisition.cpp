@@ -1,4 +1,4 @@
-#include "isohf/surface/resample/acquisition.h"
+#include "isohf/sampling/resample/acquisition.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

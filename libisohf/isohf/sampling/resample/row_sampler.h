@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "isohf/surface/resample/kernels.h"
-#include "isohf/surface/source/source_axis.h"
-#include "isohf/surface/source/source_band.h"
-#include "isohf/surface/source/source_statistics.h"
+#include "isohf/sampling/resample/kernels.h"
+#include "isohf/sampling/source/source_axis.h"
+#include "isohf/sampling/source/source_band.h"
+#include "isohf/sampling/source/source_statistics.h"
 
 namespace isohf {
 

@@ -7,9 +7,9 @@
 
 #include "isohf/base/sample.h"
 #include "isohf/raster.h"
-#include "isohf/surface/resample/prefilter.h"
-#include "isohf/surface/resample/tile_resampler.h"
-#include "isohf/surface/source/source_rows.h"
+#include "isohf/sampling/resample/prefilter.h"
+#include "isohf/sampling/resample/tile_resampler.h"
+#include "isohf/sampling/source/source_rows.h"
 
 namespace isohf {
 

@@ -1,4 +1,4 @@
-#include "isohf/surface/resample/height_error.h"
+#include "isohf/sampling/resample/height_error.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "isohf/surface/resample/prefilter.h"
+#include "isohf/sampling/resample/prefilter.h"
 
 #include <fmt/format.h>
 #include <oneapi/tbb/blocked_range.h>

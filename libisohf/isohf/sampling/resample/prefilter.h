@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "isohf/base/view.h"
-#include "isohf/surface/resample/acquisition.h"
-#include "isohf/surface/resample/kernels.h"
+#include "isohf/sampling/resample/acquisition.h"
+#include "isohf/sampling/resample/kernels.h"
 
 namespace isohf {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "isohf/raster.h"
-#include "isohf/surface/resample/kernels.h"
+#include "isohf/sampling/resample/kernels.h"
 
 namespace isohf {
 

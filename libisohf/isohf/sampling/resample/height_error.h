@@ -1,8 +1,8 @@
 #pragma once
 
-#include "isohf/surface/resample/kernels.h"
-#include "isohf/surface/resample/prefilter.h"
-#include "isohf/surface/source/source_statistics.h"
+#include "isohf/sampling/resample/kernels.h"
+#include "isohf/sampling/resample/prefilter.h"
+#include "isohf/sampling/source/source_statistics.h"
 
 namespace isohf {
 

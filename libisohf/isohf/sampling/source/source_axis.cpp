@@ -1,4 +1,4 @@
-#include "isohf/surface/source/source_axis.h"
+#include "isohf/sampling/source/source_axis.h"
 
 #include <algorithm>
 #include <cmath>

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "isohf/raster.h"
-#include "isohf/surface/source/source_statistics.h"
+#include "isohf/sampling/source/source_statistics.h"
 
 namespace isohf {
 

@@ -1,4 +1,4 @@
-#include "isohf/surface/source/source_statistics.h"
+#include "isohf/sampling/source/source_statistics.h"
 
 #include <fmt/format.h>
 

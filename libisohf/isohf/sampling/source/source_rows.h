@@ -13,7 +13,7 @@
 
 #include "isohf/base/file.h"
 #include "isohf/raster.h"
-#include "isohf/surface/resample/row_sampler.h"
+#include "isohf/sampling/resample/row_sampler.h"
 
 namespace isohf {
 

@@ -1,4 +1,4 @@
-#include "isohf/surface/resample/void_rule.h"
+#include "isohf/sampling/resample/void_rule.h"
 
 #include <algorithm>
 #include <cmath>

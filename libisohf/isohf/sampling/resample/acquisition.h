@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "isohf/surface/resample/kernels.h"
+#include "isohf/sampling/resample/kernels.h"
 
 namespace isohf {
 

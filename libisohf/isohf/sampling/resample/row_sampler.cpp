@@ -1,4 +1,4 @@
-#include "isohf/surface/resample/row_sampler.h"
+#include "isohf/sampling/resample/row_sampler.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 
 #include "isohf/base/assert.h"
 #include "isohf/base/simd.h"
-#include "isohf/surface/resample/void_rule.h"
+#include "isohf/sampling/resample/void_rule.h"
 
 namespace isohf {
 namespace {

@@ -1,4 +1,4 @@
-#include "isohf/surface/source/edge_range.h"
+#include "isohf/sampling/source/edge_range.h"
 
 #include <algorithm>
 #include <cmath>

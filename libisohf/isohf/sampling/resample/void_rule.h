@@ -3,9 +3,9 @@
 #include <array>
 #include <cstdint>
 
-#include "isohf/surface/resample/kernels.h"
-#include "isohf/surface/source/source_axis.h"
-#include "isohf/surface/source/source_band.h"
+#include "isohf/sampling/resample/kernels.h"
+#include "isohf/sampling/source/source_axis.h"
+#include "isohf/sampling/source/source_band.h"
 
 namespace isohf {
 
