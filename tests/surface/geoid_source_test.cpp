@@ -1,4 +1,4 @@
-#include "isohf/surface/decorate/geoid_source.h"
+#include "isohf/fill/geoid_source.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

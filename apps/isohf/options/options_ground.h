@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "isohf/convert.h"
-#include "isohf/surface/decorate/geoid_source.h"
+#include "isohf/fill/geoid_source.h"
 #include "options/command_line.h"
 
 namespace isohf::cli {

@@ -10,8 +10,8 @@
 #include "formats/mosaic/mosaic_source.h"
 #include "formats/registry.h"
 #include "isohf/convert.h"
+#include "isohf/fill/geoid_source.h"
 #include "isohf/raster.h"
-#include "isohf/surface/decorate/geoid_source.h"
 #include "options/command_line.h"
 #include "options/options_common.h"
 

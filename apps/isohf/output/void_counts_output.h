@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "isohf/surface/decorate/filled_source.h"
+#include "isohf/fill/filled_source.h"
 
 namespace isohf::cli {
 

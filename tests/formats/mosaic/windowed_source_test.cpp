@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "isohf/surface/decorate/filled_source.h"
-#include "isohf/surface/decorate/geoid_source.h"
+#include "isohf/fill/filled_source.h"
+#include "isohf/fill/geoid_source.h"
 #include "support/rasters/memory_source.h"
 #include "support/rasters/place_at.h"
 #include "support/rasters/small_geoid.h"

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "isohf/base/memory/kept_rows.h"
+#include "isohf/fill/void_filler.h"
 #include "isohf/job.h"
 #include "isohf/raster.h"
-#include "isohf/surface/decorate/void_filler.h"
 
 namespace isohf {
 

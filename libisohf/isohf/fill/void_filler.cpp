@@ -1,4 +1,4 @@
-#include "isohf/surface/decorate/void_filler.h"
+#include "isohf/fill/void_filler.h"
 
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>

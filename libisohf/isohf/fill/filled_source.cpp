@@ -1,4 +1,4 @@
-#include "isohf/surface/decorate/filled_source.h"
+#include "isohf/fill/filled_source.h"
 
 #include <fmt/format.h>
 
