@@ -18,7 +18,7 @@
 #include "isohf/base/handed_in.h"
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
-#include "isohf/surface/photo/srgb.h"
+#include "isohf/photo/srgb.h"
 
 namespace isohf {
 namespace {

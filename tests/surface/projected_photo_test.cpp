@@ -1,10 +1,10 @@
-#include "isohf/surface/photo/projected_photo.h"
+#include "isohf/photo/projected_photo.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "isohf/surface/photo/srgb.h"
+#include "isohf/photo/srgb.h"
 #include "support/rasters/memory_photo.h"
 
 namespace isohf {

@@ -1,11 +1,11 @@
-#include "isohf/surface/photo/texture_cutter.h"
+#include "isohf/photo/texture_cutter.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "isohf/surface/photo/srgb.h"
+#include "isohf/photo/srgb.h"
 #include "support/rasters/memory_photo.h"
 
 namespace isohf {

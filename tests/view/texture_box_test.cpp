@@ -10,7 +10,7 @@
 #include "camera.h"
 #include "gl/offscreen.h"
 #include "gl_test.h"
-#include "isohf/surface/photo/texture_cutter.h"
+#include "isohf/photo/texture_cutter.h"
 #include "memory_tiles.h"
 #include "paging/texture_overview.h"
 #include "session.h"

@@ -5,8 +5,8 @@
 #include <bit>
 
 #include "isohf/error.h"
+#include "isohf/photo/texture_cutter.h"
 #include "isohf/picture.h"
-#include "isohf/surface/photo/texture_cutter.h"
 #include "options/describe.h"
 #include "options/option_values.h"
 

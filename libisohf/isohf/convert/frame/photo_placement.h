@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "isohf/convert/frame/plan.h"
+#include "isohf/photo/texture_cutter.h"
 #include "isohf/picture.h"
-#include "isohf/surface/photo/texture_cutter.h"
 
 namespace isohf {
 

@@ -11,7 +11,7 @@
 #include "isohf/base/handed_in.h"
 #include "isohf/convert/frame/photo_placement.h"
 #include "isohf/error.h"
-#include "isohf/surface/photo/bordered_photo.h"
+#include "isohf/photo/bordered_photo.h"
 
 namespace isohf {
 namespace {

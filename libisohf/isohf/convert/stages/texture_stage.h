@@ -10,8 +10,8 @@
 #include "isohf/archive/writer.h"
 #include "isohf/convert.h"
 #include "isohf/convert/frame/plan.h"
-#include "isohf/surface/photo/projected_photo.h"
-#include "isohf/surface/photo/texture_cutter.h"
+#include "isohf/photo/projected_photo.h"
+#include "isohf/photo/texture_cutter.h"
 
 namespace isohf {
 

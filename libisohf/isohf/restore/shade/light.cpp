@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "isohf/base/handed_in.h"
+#include "isohf/photo/srgb.h"
 #include "isohf/restore/shade/relief.h"
-#include "isohf/surface/photo/srgb.h"
 
 namespace isohf {
 namespace {

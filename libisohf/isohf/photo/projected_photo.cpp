@@ -1,11 +1,11 @@
-#include "isohf/surface/photo/projected_photo.h"
+#include "isohf/photo/projected_photo.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "isohf/base/assert.h"
-#include "isohf/surface/photo/srgb.h"
+#include "isohf/photo/srgb.h"
 
 namespace isohf {
 namespace {

@@ -1,11 +1,11 @@
-#include "isohf/surface/photo/texture_cutter.h"
+#include "isohf/photo/texture_cutter.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "isohf/base/assert.h"
-#include "isohf/surface/photo/srgb.h"
+#include "isohf/photo/srgb.h"
 
 namespace isohf {
 namespace {

@@ -1,4 +1,4 @@
-#include "isohf/surface/photo/srgb.h"
+#include "isohf/photo/srgb.h"
 
 #include <cmath>
 #include <cstddef>

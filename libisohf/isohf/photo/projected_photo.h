@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
+#include "isohf/photo/texture_cutter.h"
 #include "isohf/picture.h"
 #include "isohf/sampling/resample/source_warp.h"
-#include "isohf/surface/photo/texture_cutter.h"
 
 namespace isohf {
 

@@ -1,4 +1,4 @@
-#include "isohf/surface/photo/bordered_photo.h"
+#include "isohf/photo/bordered_photo.h"
 
 #include <algorithm>
 #include <vector>
