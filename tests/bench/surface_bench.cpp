@@ -17,13 +17,13 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/base/sample.h"
+#include "isohf/light/normals.h"
+#include "isohf/light/shadow_hull.h"
 #include "isohf/raster.h"
 #include "isohf/sampling/resample/kernels.h"
 #include "isohf/sampling/resample/prefilter.h"
 #include "isohf/sampling/resample/tile_resampler.h"
 #include "isohf/sampling/source/source_statistics.h"
-#include "isohf/surface/shade/normals.h"
-#include "isohf/surface/shade/shadow_hull.h"
 
 namespace {
 

@@ -10,7 +10,7 @@
 #include "isohf/archive/shadow_seeds/shadow_seed_reader.h"
 #include "isohf/convert.h"
 #include "isohf/error.h"
-#include "isohf/surface/shade/shadow.h"
+#include "isohf/light/shadow.h"
 #include "isohf/verify.h"
 #include "support/rasters/memory_source.h"
 #include "support/run_program.h"

@@ -12,7 +12,7 @@
 #include "isohf/convert.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
-#include "isohf/surface/shade/normals.h"
+#include "isohf/light/normals.h"
 #include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 

@@ -12,8 +12,8 @@
 #include "isohf/archive.h"
 #include "isohf/convert.h"
 #include "isohf/error.h"
+#include "isohf/light/shadow.h"
 #include "isohf/surface.h"
-#include "isohf/surface/shade/shadow.h"
 #include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 

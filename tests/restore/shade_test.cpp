@@ -10,7 +10,7 @@
 
 #include "isohf/convert.h"
 #include "isohf/error.h"
-#include "isohf/restore/shade/light.h"
+#include "isohf/light/light.h"
 #include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 

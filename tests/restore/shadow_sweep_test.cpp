@@ -1,4 +1,4 @@
-#include "isohf/restore/shade/shadow_sweep.h"
+#include "isohf/light/shadow_sweep.h"
 
 #include <gtest/gtest.h>
 

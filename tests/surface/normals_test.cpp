@@ -1,4 +1,4 @@
-#include "isohf/surface/shade/normals.h"
+#include "isohf/light/normals.h"
 
 #include <gtest/gtest.h>
 

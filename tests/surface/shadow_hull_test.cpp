@@ -1,4 +1,4 @@
-#include "isohf/surface/shade/shadow_hull.h"
+#include "isohf/light/shadow_hull.h"
 
 #include <gtest/gtest.h>
 

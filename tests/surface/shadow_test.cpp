@@ -1,4 +1,4 @@
-#include "isohf/surface/shade/shadow.h"
+#include "isohf/light/shadow.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 
 #include "isohf/base/view.h"
 #include "isohf/lattice.h"
-#include "isohf/surface/shade/shadow.h"
+#include "isohf/light/shadow.h"
 
 /// A row of tiles with made-up codes, and its shadows by the definition: every vertex against every vertex before it.
 

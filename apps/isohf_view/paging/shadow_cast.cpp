@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "isohf/error.h"
-#include "isohf/restore/shade/shadow_sweep.h"
+#include "isohf/light/shadow_sweep.h"
 
 namespace isohf::view {
 namespace {

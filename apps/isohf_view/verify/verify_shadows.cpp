@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "isohf/error.h"
-#include "isohf/surface/shade/shadow.h"
+#include "isohf/light/shadow.h"
 #include "paging/shadow_cast.h"
 #include "verify/verify_view.h"
 

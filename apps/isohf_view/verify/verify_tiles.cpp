@@ -6,7 +6,7 @@
 
 #include "isohf/error.h"
 #include "isohf/lattice/lod.h"
-#include "isohf/surface/shade/normals.h"
+#include "isohf/light/normals.h"
 #include "verify/verify_view.h"
 
 namespace isohf::view {

@@ -13,7 +13,7 @@
 
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/base/assert.h"
-#include "isohf/surface/shade/normals.h"
+#include "isohf/light/normals.h"
 
 namespace isohf {
 namespace {

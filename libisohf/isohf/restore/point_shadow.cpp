@@ -11,7 +11,7 @@
 #include "isohf/archive/codec/quantise.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
-#include "isohf/surface/shade/shadow.h"
+#include "isohf/light/shadow.h"
 
 namespace isohf {
 namespace {

@@ -3,8 +3,8 @@
 #include <span>
 
 #include "isohf/lattice/crossings.h"
+#include "isohf/light/shadow_sweep.h"
 #include "isohf/restore/point_sampler.h"
-#include "isohf/restore/shade/shadow_sweep.h"
 #include "isohf/surface.h"
 
 namespace isohf {

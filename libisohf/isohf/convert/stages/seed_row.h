@@ -6,7 +6,7 @@
 
 #include "isohf/archive/shadow_seeds/shadow_seeds.h"
 #include "isohf/base/memory/spill_buffer.h"
-#include "isohf/surface/shade/shadow_hull.h"
+#include "isohf/light/shadow_hull.h"
 
 namespace isohf {
 

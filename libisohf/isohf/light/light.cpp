@@ -1,11 +1,11 @@
-#include "isohf/restore/shade/light.h"
+#include "isohf/light/light.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "isohf/base/handed_in.h"
+#include "isohf/light/relief.h"
 #include "isohf/photo/srgb.h"
-#include "isohf/restore/shade/relief.h"
 
 namespace isohf {
 namespace {

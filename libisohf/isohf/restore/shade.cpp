@@ -21,12 +21,12 @@
 #include "isohf/base/simd.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
+#include "isohf/light/light.h"
+#include "isohf/light/relief.h"
+#include "isohf/light/shadow_sweep.h"
 #include "isohf/photo/srgb.h"
 #include "isohf/restore/ground_scale.h"
 #include "isohf/restore/point_sampler.h"
-#include "isohf/restore/shade/light.h"
-#include "isohf/restore/shade/relief.h"
-#include "isohf/restore/shade/shadow_sweep.h"
 
 namespace isohf {
 namespace {

@@ -1,4 +1,4 @@
-#include "isohf/restore/shade/relief.h"
+#include "isohf/light/relief.h"
 
 #include <cmath>
 #include <cstdint>

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "isohf/light/normals.h"
 #include "isohf/shade.h"
-#include "isohf/surface/shade/normals.h"
 
 namespace isohf {
 

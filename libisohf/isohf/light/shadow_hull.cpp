@@ -1,4 +1,4 @@
-#include "isohf/surface/shade/shadow_hull.h"
+#include "isohf/light/shadow_hull.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "isohf/base/bytes.h"
-#include "isohf/surface/shade/shadow.h"
+#include "isohf/light/shadow.h"
 
 namespace isohf {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "isohf/base/memory/kept_rows.h"
 #include "isohf/lattice.h"
+#include "isohf/light/shadow_front.h"
 #include "isohf/metadata.h"
-#include "isohf/surface/shade/shadow_front.h"
 
 namespace isohf {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include "isohf/surface/shade/normals.h"
+#include "isohf/light/normals.h"
 
 namespace isohf {
 

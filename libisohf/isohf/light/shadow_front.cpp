@@ -1,4 +1,4 @@
-#include "isohf/surface/shade/shadow_front.h"
+#include "isohf/light/shadow_front.h"
 
 #include <algorithm>
 #include <cmath>
