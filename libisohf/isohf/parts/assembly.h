@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "isohf/archive/writer.h"
-#include "isohf/convert/parts/part_file.h"
 #include "isohf/convert/stages/plane_stage.h"
 #include "isohf/job.h"
+#include "isohf/parts/part_file.h"
 #include "isohf/restore/lossless.h"
 
 namespace isohf {

@@ -12,8 +12,8 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/handed_in.h"
-#include "isohf/convert/parts/parts.h"
 #include "isohf/error.h"
+#include "isohf/parts/parts.h"
 
 namespace isohf {
 namespace {

@@ -1,4 +1,4 @@
-#include "isohf/convert/parts/parts.h"
+#include "isohf/parts/parts.h"
 
 #include <fmt/format.h>
 

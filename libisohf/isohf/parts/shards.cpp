@@ -19,11 +19,11 @@
 #include "isohf/base/arena.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/convert/job_description.h"
-#include "isohf/convert/parts/assembly.h"
-#include "isohf/convert/parts/parts.h"
-#include "isohf/convert/parts/problems.h"
 #include "isohf/convert/run_conversion.h"
 #include "isohf/error.h"
+#include "isohf/parts/assembly.h"
+#include "isohf/parts/parts.h"
+#include "isohf/parts/problems.h"
 
 namespace isohf {
 namespace {

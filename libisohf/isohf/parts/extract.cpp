@@ -21,9 +21,9 @@
 #include "isohf/archive/writer.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/source_bytes.h"
-#include "isohf/convert/parts/parts.h"
 #include "isohf/convert/stages/seed_row.h"
 #include "isohf/error.h"
+#include "isohf/parts/parts.h"
 #include "isohf/restore/lossless.h"
 #include "isohf/surface.h"
 

@@ -1,4 +1,4 @@
-#include "isohf/convert/parts/assembly.h"
+#include "isohf/parts/assembly.h"
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>

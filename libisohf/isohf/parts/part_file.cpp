@@ -1,4 +1,4 @@
-#include "isohf/convert/parts/part_file.h"
+#include "isohf/parts/part_file.h"
 
 #include <fmt/format.h>
 
