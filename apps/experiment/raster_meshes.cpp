@@ -9,8 +9,8 @@
 #include <numbers>
 #include <vector>
 
-#include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/tile/quantise.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/sampling/resample/prefilter.h"
 #include "isohf/sampling/resample/row_sampler.h"

@@ -3,11 +3,11 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "archive/codec/tiles.h"
+#include "archive/tile/tiles.h"
 #include "isohf/archive.h"
-#include "isohf/archive/codec/tile_codes.h"
-#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/tile_codes.h"
+#include "isohf/archive/tile/tile_encoder.h"
 #include "isohf/archive/writer.h"
 #include "isohf/error.h"
 #include "support/temporary_folder.h"

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <thread>
 
-#include "archive/codec/tiles.h"
+#include "archive/tile/tiles.h"
 #include "isohf/archive.h"
 #include "isohf/base/source_bytes.h"
 #include "isohf/error.h"

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "archive/codec/tiles.h"
+#include "archive/tile/tiles.h"
 #include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/archive/metadata/json_members.h"
 #include "isohf/archive/metadata/shard_record.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <map>
 
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 #include "lattice/vertex_below.h"
 
 namespace isohf {

@@ -14,7 +14,7 @@
 #include <memory>
 #include <thread>
 
-#include "archive/codec/tiles.h"
+#include "archive/tile/tiles.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/member_tables.h"
 #include "isohf/archive/deflate/deflate.h"

@@ -1,5 +1,5 @@
 #include "isohf/archive/writer.h"
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,9 +12,9 @@
 #include <csignal>
 #include <tuple>
 
-#include "archive/codec/tiles.h"
+#include "archive/tile/tiles.h"
 #include "isohf/archive.h"
-#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/error.h"
 #include "support/temporary_folder.h"
 

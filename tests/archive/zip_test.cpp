@@ -2,13 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include "archive/codec/tiles.h"
+#include "archive/tile/tiles.h"
 #include "isohf/archive.h"
 #include "isohf/archive/archive_index_builder.h"
-#include "isohf/archive/codec/tile_codes.h"
-#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/tile_codes.h"
+#include "isohf/archive/tile/tile_encoder.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
 #include "support/temporary_folder.h"

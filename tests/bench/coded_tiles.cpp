@@ -2,15 +2,15 @@
 
 #include <cmath>
 
-#include "isohf/archive/codec/predict/context_energy.h"
-#include "isohf/archive/codec/predict/hex_predictor.h"
-#include "isohf/archive/codec/predict/predictor_fit.h"
-#include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/residuals/residual_streams.h"
-#include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/archive/codec/tile_codes.h"
-#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/predict/context_energy.h"
+#include "isohf/archive/tile/predict/hex_predictor.h"
+#include "isohf/archive/tile/predict/predictor_fit.h"
+#include "isohf/archive/tile/quantise.h"
+#include "isohf/archive/tile/residuals/residual_streams.h"
+#include "isohf/archive/tile/residuals/residual_symbols.h"
+#include "isohf/archive/tile/tile_codes.h"
+#include "isohf/archive/tile/tile_encoder.h"
 
 namespace isohf::bench {
 

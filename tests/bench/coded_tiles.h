@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "isohf/archive/codec/predict/sample_lattice.h"
-#include "isohf/archive/codec/residuals/residual_streams.h"
-#include "isohf/archive/codec/tile_codes.h"
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/tile/predict/sample_lattice.h"
+#include "isohf/archive/tile/residuals/residual_streams.h"
+#include "isohf/archive/tile/tile_codes.h"
+#include "isohf/archive/tile/tile_encoder.h"
 
 /// What the kernels of the tile codec are measured on.
 namespace isohf::bench {

@@ -5,12 +5,12 @@
 #include <vector>
 
 #include "bench/coded_tiles.h"
-#include "isohf/archive/codec/residuals/pair_coding.h"
-#include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/archive/codec/simd/residual_expander.h"
-#include "isohf/archive/codec/tile_decoder.h"
-#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/residuals/pair_coding.h"
+#include "isohf/archive/tile/residuals/residual_symbols.h"
+#include "isohf/archive/tile/simd/residual_expander.h"
+#include "isohf/archive/tile/tile_decoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 
 namespace isohf::bench {
 namespace {

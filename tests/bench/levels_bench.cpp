@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "isohf/archive.h"
-#include "isohf/archive/codec/tile_codes.h"
-#include "isohf/archive/codec/tile_decoder.h"
-#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/tile_codes.h"
+#include "isohf/archive/tile/tile_decoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 #include "isohf/error.h"
 
 namespace {

@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/quantise.h"
+#include "isohf/archive/tile/tile_encoder.h"
 #include "isohf/base/sample.h"
 #include "isohf/light/normals.h"
 #include "isohf/light/shadow_hull.h"

@@ -1,5 +1,5 @@
 #include "isohf/convert/job_description.h"
-#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/tile/tile_codes.h"
 
 #include <gtest/gtest.h>
 

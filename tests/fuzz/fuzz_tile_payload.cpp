@@ -7,10 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "isohf/archive/codec/tile_decoder.h"
-#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/tile_decoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 #include "isohf/error.h"
 
 namespace {

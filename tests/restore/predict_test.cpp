@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/tile/quantise.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
 #include "isohf/restore/grid_sampler.h"

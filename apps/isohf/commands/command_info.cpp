@@ -11,9 +11,9 @@
 
 #include "commands/command.h"
 #include "isohf/archive.h"
-#include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/metadata/shard_record.h"
 #include "isohf/archive/textures/texture_info.h"
+#include "isohf/archive/tile/quantise.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/error.h"
 #include "isohf/parts.h"

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/base/assert.h"
 
 namespace isohf {

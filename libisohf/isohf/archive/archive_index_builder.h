@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "isohf/archive.h"
-#include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/container/table_writer.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/journal.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/base/memory/spill_buffer.h"
 #include "isohf/base/output_file.h"
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/container/member_tables.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/base/file.h"
 #include "isohf/base/zip.h"
 

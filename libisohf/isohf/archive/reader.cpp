@@ -9,12 +9,12 @@
 #include <unordered_map>
 #include <utility>
 
-#include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/tile_codes.h"
-#include "isohf/archive/codec/tile_decoder.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/metadata/shard_record.h"
+#include "isohf/archive/tile/quantise.h"
+#include "isohf/archive/tile/tile_codes.h"
+#include "isohf/archive/tile/tile_decoder.h"
 #include "isohf/archive/tile_locator.h"
 #include "isohf/base/source_bytes.h"
 #include "isohf/error.h"

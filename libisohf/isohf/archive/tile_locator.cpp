@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "isohf/archive/codec/tile_payload.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/tile_payload.h"
 #include "isohf/error.h"
 
 namespace isohf {

@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/tile/quantise.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/base/simd.h"
 #include "isohf/error.h"
 

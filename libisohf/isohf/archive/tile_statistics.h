@@ -1,6 +1,6 @@
 #pragma once
 
-#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/tile/tile_codes.h"
 
 namespace isohf {
 

@@ -1,6 +1,6 @@
 #include "isohf/archive/writer.h"
-#include "isohf/archive/codec/tile_decoder.h"
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/tile/tile_decoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 
 #include <fmt/format.h>
 #include <oneapi/tbb/task_group.h>
@@ -13,12 +13,12 @@
 #include <vector>
 
 #include "isohf/archive/archive_index_builder.h"
-#include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/journal.h"
 #include "isohf/archive/metadata/accuracy_info.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
 #include "isohf/base/output_file.h"

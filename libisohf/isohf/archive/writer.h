@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/member_tables.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/byte_source.h"
 #include "isohf/metadata.h"
 

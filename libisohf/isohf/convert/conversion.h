@@ -3,7 +3,7 @@
 #include <cmath>
 #include <memory>
 
-#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/tile/quantise.h"
 #include "isohf/convert.h"
 #include "isohf/convert/memory_plan.h"
 #include "isohf/sampling/resample/kernels.h"

@@ -1,6 +1,6 @@
 #include "isohf/convert/run_conversion.h"
 
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_pipeline.h>
@@ -12,9 +12,9 @@
 #include <memory>
 #include <optional>
 
-#include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/archive/planes/archive_planes.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/archive/writer.h"
 #include "isohf/base/arena.h"

@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/content_hash.h"
+#include "isohf/archive/tile/quantise.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/handed_in.h"
 #include "isohf/error.h"

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include "isohf/archive/codec/tile_decoder.h"
-#include "isohf/archive/codec/tile_payload.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/tile_decoder.h"
+#include "isohf/archive/tile/tile_payload.h"
 #include "isohf/base/source_bytes.h"
 #include "isohf/error.h"
 

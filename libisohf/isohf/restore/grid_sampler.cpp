@@ -8,7 +8,7 @@
 #include <limits>
 #include <utility>
 
-#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/tile/quantise.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/handed_in.h"
 #include "isohf/error.h"

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/tile/quantise.h"
 #include "isohf/base/assert.h"
 #include "isohf/light/normals.h"
 

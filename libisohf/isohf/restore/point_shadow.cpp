@@ -8,7 +8,7 @@
 #include <limits>
 #include <numbers>
 
-#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/tile/quantise.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/light/shadow.h"

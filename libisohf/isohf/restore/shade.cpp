@@ -12,9 +12,9 @@
 #include <optional>
 #include <vector>
 
-#include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/textures/texture_reader.h"
+#include "isohf/archive/tile/quantise.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/handed_in.h"
 #include "isohf/base/memory/memory_budget.h"

@@ -11,13 +11,13 @@
 #include <memory>
 #include <utility>
 
-#include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/tile_codes.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/planes/plane_builder.h"
+#include "isohf/archive/tile/quantise.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/archive/tile_locator.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/base/arena.h"

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include "isohf/archive/codec/quantise.h"
 #include "isohf/archive/metadata/cut_record.h"
 #include "isohf/archive/metadata/shard_record.h"
+#include "isohf/archive/tile/quantise.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/memory/memory_budget.h"
 #include "isohf/error.h"

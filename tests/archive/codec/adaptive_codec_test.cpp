@@ -5,13 +5,13 @@
 #include <optional>
 #include <random>
 
-#include "isohf/archive/codec/adaptive/adaptive_decoder.h"
-#include "isohf/archive/codec/adaptive/adaptive_payload.h"
-#include "isohf/archive/codec/adaptive/symbol_model.h"
-#include "isohf/archive/codec/tile_decoder.h"
-#include "isohf/archive/codec/tile_encoder.h"
-#include "isohf/archive/codec/tile_payload.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/adaptive/adaptive_decoder.h"
+#include "isohf/archive/tile/adaptive/adaptive_payload.h"
+#include "isohf/archive/tile/adaptive/symbol_model.h"
+#include "isohf/archive/tile/tile_decoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
+#include "isohf/archive/tile/tile_payload.h"
 #include "isohf/base/simd.h"
 #include "isohf/error.h"
 #include "tiles.h"

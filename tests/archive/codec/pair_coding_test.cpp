@@ -1,15 +1,15 @@
-#include "isohf/archive/codec/residuals/pair_coding.h"
+#include "isohf/archive/tile/residuals/pair_coding.h"
 
 #include <gtest/gtest.h>
 
 #include <initializer_list>
 #include <random>
 
-#include "archive/codec/tiles.h"
-#include "isohf/archive/codec/tile_decoder.h"
-#include "isohf/archive/codec/tile_encoder.h"
-#include "isohf/archive/codec/tile_payload.h"
+#include "archive/tile/tiles.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/tile_decoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
+#include "isohf/archive/tile/tile_payload.h"
 
 namespace isohf {
 namespace {

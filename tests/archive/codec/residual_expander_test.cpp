@@ -1,11 +1,11 @@
-#include "isohf/archive/codec/simd/residual_expander.h"
+#include "isohf/archive/tile/simd/residual_expander.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 #include <vector>
 
-#include "isohf/archive/codec/residuals/residual_symbols.h"
+#include "isohf/archive/tile/residuals/residual_symbols.h"
 #include "isohf/base/simd.h"
 
 namespace isohf {

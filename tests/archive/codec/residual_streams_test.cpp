@@ -1,4 +1,4 @@
-#include "isohf/archive/codec/residuals/residual_streams.h"
+#include "isohf/archive/tile/residuals/residual_streams.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 #include <random>
 #include <vector>
 
-#include "isohf/archive/codec/residuals/bits.h"
-#include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/archive/codec/tile_codes.h"
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/tile/residuals/bits.h"
+#include "isohf/archive/tile/residuals/residual_symbols.h"
+#include "isohf/archive/tile/tile_codes.h"
+#include "isohf/archive/tile/tile_encoder.h"
 #include "isohf/base/simd.h"
 
 namespace isohf {

@@ -1,8 +1,8 @@
 /// Kernels of base/simd.h compiled for AVX2 and for the base set: the same bits.
 
 #include "isohf/base/simd.h"
-#include "isohf/archive/codec/tile_decoder.h"
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/tile/tile_decoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 
 #include <gtest/gtest.h>
 
@@ -10,10 +10,10 @@
 #include <limits>
 #include <random>
 
-#include "archive/codec/tiles.h"
-#include "isohf/archive/codec/quantise.h"
-#include "isohf/archive/codec/tile_codes.h"
+#include "archive/tile/tiles.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/quantise.h"
+#include "isohf/archive/tile/tile_codes.h"
 
 namespace isohf {
 namespace {

@@ -1,5 +1,5 @@
-#include "isohf/archive/codec/tile_decoder.h"
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/tile/tile_decoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 
 #include <gtest/gtest.h>
 
@@ -7,11 +7,11 @@
 #include <cstring>
 #include <random>
 
-#include "archive/codec/tiles.h"
 #include "archive/deflate/zlib_inflate.h"
-#include "isohf/archive/codec/tile_payload.h"
+#include "archive/tile/tiles.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/tile_payload.h"
 #include "isohf/error.h"
 
 namespace isohf {

@@ -1,12 +1,12 @@
-#include "isohf/archive/codec/tile_decoder.h"
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/tile/tile_decoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 
 #include <gtest/gtest.h>
 
 #include <optional>
 #include <random>
 
-#include "archive/codec/tiles.h"
+#include "archive/tile/tiles.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/error.h"
 

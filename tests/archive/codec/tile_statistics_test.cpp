@@ -1,5 +1,5 @@
 #include "isohf/archive/tile_statistics.h"
-#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/tile/tile_codes.h"
 
 #include <gtest/gtest.h>
 

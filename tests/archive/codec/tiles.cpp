@@ -1,4 +1,4 @@
-#include "archive/codec/tiles.h"
+#include "archive/tile/tiles.h"
 
 #include <algorithm>
 #include <bit>
@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 #include "isohf/archive/writer.h"
 
 namespace isohf::test {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/metadata.h"
 
 /// Tiles and archives to test with.

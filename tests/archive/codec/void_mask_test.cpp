@@ -1,4 +1,4 @@
-#include "isohf/archive/codec/tile_payload.h"
+#include "isohf/archive/tile/tile_payload.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 #include "isohf/archive/deflate/literal_inflater.h"
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 
 #include <gtest/gtest.h>
 #include <libdeflate.h>
@@ -9,10 +9,10 @@
 #include <optional>
 #include <random>
 
-#include "archive/codec/tiles.h"
-#include "isohf/archive/codec/tile_codes.h"
+#include "archive/tile/tiles.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/deflate/deflate_writer.h"
+#include "isohf/archive/tile/tile_codes.h"
 
 namespace isohf {
 namespace {

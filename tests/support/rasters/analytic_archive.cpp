@@ -1,7 +1,7 @@
 #include "support/rasters/analytic_archive.h"
 
-#include "isohf/archive/codec/tile_codes.h"
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/tile/tile_codes.h"
+#include "isohf/archive/tile/tile_encoder.h"
 #include "isohf/archive/writer.h"
 #include "support/rasters/analytic_surface.h"
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/base/memory/kept_rows.h"
 #include "isohf/lattice/planes.h"
 

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <limits>
 
-#include "isohf/archive/codec/residuals/residual_symbols.h"
-#include "isohf/archive/codec/tile_payload.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/deflate/deflate_writer.h"
+#include "isohf/archive/tile/residuals/residual_symbols.h"
+#include "isohf/archive/tile/tile_payload.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"

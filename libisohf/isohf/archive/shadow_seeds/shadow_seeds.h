@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/lattice/shadow_path.h"
 #include "isohf/metadata.h"
 

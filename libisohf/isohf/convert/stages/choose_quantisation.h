@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/tile/quantise.h"
 #include "isohf/metadata.h"
 #include "isohf/raster.h"
 #include "isohf/sampling/resample/kernels.h"

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/tile/quantise.h"
 #include "isohf/convert/conversion.h"
 #include "isohf/convert/stages/tile_source.h"
 

@@ -1,6 +1,6 @@
 #include "isohf/convert/stages/plane_stage.h"
 
-#include "isohf/archive/codec/tile_encoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 
 namespace isohf {
 

@@ -2,9 +2,9 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
-#include "isohf/archive/codec/tile_decoder.h"
-#include "isohf/archive/codec/tile_encoder.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/tile/tile_decoder.h"
+#include "isohf/archive/tile/tile_encoder.h"
 #include "isohf/convert/stages/code_source.h"
 
 namespace isohf {

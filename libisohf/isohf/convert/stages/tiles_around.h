@@ -4,7 +4,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/convert/conversion.h"
 #include "isohf/sampling/source/source_band.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/tile/quantise.h"
 
 namespace isohf {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "isohf/archive/codec/tile_codes.h"
+#include "isohf/archive/tile/tile_codes.h"
 #include "isohf/lattice.h"
 #include "isohf/metadata.h"
 

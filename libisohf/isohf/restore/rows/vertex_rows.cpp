@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "isohf/archive/codec/quantise.h"
+#include "isohf/archive/tile/quantise.h"
 #include "isohf/base/assert.h"
 
 namespace isohf {
