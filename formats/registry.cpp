@@ -11,11 +11,11 @@
 #include <limits>
 #include <span>
 
-#include "formats/files/file_stamp.h"
-#include "formats/files/foreign_file.h"
-#include "formats/files/raw_file.h"
-#include "formats/files/text.h"
 #include "formats/georeference/reference_system.h"
+#include "formats/io/file_stamp.h"
+#include "formats/io/foreign_file.h"
+#include "formats/io/raw_file.h"
+#include "formats/io/text.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "isohf/base/file.h"

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "formats/files/foreign_file.h"
+#include "formats/io/foreign_file.h"
 #include "formats/registry.h"
 #include "isohf/error.h"
 #include "isohf/surface.h"

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "formats/files/text.h"
-#include "formats/files/text_tokens.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/io/text.h"
+#include "formats/io/text_tokens.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"
 

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "formats/binary_grids/described_source.h"
-#include "formats/files/bands.h"
-#include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/units.h"
+#include "formats/io/bands.h"
+#include "formats/io/text.h"
 #include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"

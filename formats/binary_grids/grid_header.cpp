@@ -7,8 +7,8 @@
 #include <charconv>
 #include <cmath>
 
-#include "formats/files/text.h"
-#include "formats/files/text_tokens.h"
+#include "formats/io/text.h"
+#include "formats/io/text_tokens.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"
 

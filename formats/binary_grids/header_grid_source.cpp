@@ -12,10 +12,10 @@
 
 #include "formats/binary_grids/grid_header.h"
 #include "formats/binary_grids/plain_samples.h"
-#include "formats/files/bands.h"
-#include "formats/files/file_source.h"
-#include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/io/bands.h"
+#include "formats/io/file_source.h"
+#include "formats/io/text.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"

@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "formats/files/file_source.h"
+#include "formats/io/file_source.h"
 #include "isohf/raster.h"
 
 namespace isohf {

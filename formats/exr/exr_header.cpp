@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "formats/files/text.h"
+#include "formats/io/text.h"
 #include "formats/readers.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"

@@ -29,10 +29,10 @@
 #include <vector>
 
 #include "formats/exr/exr_header.h"
-#include "formats/files/bands.h"
-#include "formats/files/file_source.h"
-#include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/io/bands.h"
+#include "formats/io/file_source.h"
+#include "formats/io/text.h"
 #include "formats/open_options.h"
 #include "isohf/base/arena.h"
 #include "isohf/error.h"

@@ -19,10 +19,10 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/files/raw_file.h"
-#include "formats/files/text.h"
 #include "formats/georeference/reference_system.h"
 #include "formats/georeference/wkt.h"
+#include "formats/io/raw_file.h"
+#include "formats/io/text.h"
 #include "formats/tiff/gdal_tags.h"
 #include "isohf/error.h"
 

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "formats/files/text.h"
 #include "formats/georeference/units.h"
+#include "formats/io/text.h"
 
 namespace isohf {
 namespace {

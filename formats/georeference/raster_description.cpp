@@ -7,10 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "formats/files/raw_file.h"
-#include "formats/files/text.h"
 #include "formats/georeference/units.h"
 #include "formats/georeference/wkt.h"
+#include "formats/io/raw_file.h"
+#include "formats/io/text.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <mutex>
 
-#include "formats/files/text.h"
 #include "formats/georeference/proj_module.h"
 #include "formats/georeference/units.h"
+#include "formats/io/text.h"
 #include "formats/module_loader.h"
 #include "isohf/convert.h"
 #include "isohf/error.h"

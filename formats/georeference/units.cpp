@@ -6,7 +6,7 @@
 #include <array>
 #include <cctype>
 
-#include "formats/files/text.h"
+#include "formats/io/text.h"
 
 namespace isohf {
 namespace {

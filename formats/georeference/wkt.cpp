@@ -16,9 +16,9 @@
 #include <utility>
 #include <vector>
 
-#include "formats/files/text.h"
 #include "formats/georeference/reference_system.h"
 #include "formats/georeference/units.h"
+#include "formats/io/text.h"
 #include "isohf/error.h"
 
 namespace isohf {

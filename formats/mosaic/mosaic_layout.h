@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "formats/decorate/cropped_source.h"
-#include "formats/files/file_stamp.h"
+#include "formats/io/file_stamp.h"
 #include "formats/mosaic/mosaic_samples.h"
 #include "isohf/projection/reference_map.h"
 #include "isohf/raster.h"

@@ -16,11 +16,11 @@
 #include <string>
 #include <vector>
 
-#include "formats/files/bands.h"
-#include "formats/files/file_source.h"
-#include "formats/files/text.h"
-#include "formats/files/text_tokens.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/io/bands.h"
+#include "formats/io/file_source.h"
+#include "formats/io/text.h"
+#include "formats/io/text_tokens.h"
 #include "formats/mosaic/mosaic_layout.h"
 #include "formats/mosaic/reader_pool.h"
 #include "formats/mosaic/strip_reader.h"

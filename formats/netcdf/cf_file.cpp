@@ -11,9 +11,9 @@
 #include <string_view>
 #include <tuple>
 
-#include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/units.h"
+#include "formats/io/text.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "formats/binary_grids/described_source.h"
-#include "formats/files/text.h"
+#include "formats/io/text.h"
 #include "formats/netcdf/cf_file.h"
 #include "formats/readers.h"
 #include "isohf/error.h"

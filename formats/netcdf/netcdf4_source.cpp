@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "formats/binary_grids/plain_samples.h"
-#include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/io/text.h"
 #include "formats/module_loader.h"
 #include "formats/netcdf/cf_file.h"
 #include "formats/netcdf/netcdf_module.h"

@@ -9,9 +9,9 @@
 #include <sstream>
 #include <vector>
 
-#include "formats/files/file_source.h"
-#include "formats/files/foreign_file.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/io/file_source.h"
+#include "formats/io/foreign_file.h"
 #include "formats/module_loader.h"
 #include "formats/oiio/oiio_module.h"
 #include "formats/open_options.h"

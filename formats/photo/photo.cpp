@@ -11,9 +11,9 @@
 #include <type_traits>
 #include <utility>
 
-#include "formats/files/block_cache.h"
-#include "formats/files/raw_file.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/io/block_cache.h"
+#include "formats/io/raw_file.h"
 #include "formats/readers.h"
 #include "isohf/base/handed_in.h"
 #include "isohf/base/sample.h"

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "formats/files/raw_file.h"
+#include "formats/io/raw_file.h"
 #include "formats/photo/photo.h"
 #include "formats/tiff/geotiff_keys.h"
 #include "formats/tiff/tiff_blocks.h"

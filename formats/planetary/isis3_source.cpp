@@ -11,11 +11,11 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/files/bands.h"
-#include "formats/files/file_source.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/map_wkt.h"
 #include "formats/georeference/units.h"
+#include "formats/io/bands.h"
+#include "formats/io/file_source.h"
 #include "formats/open_options.h"
 #include "formats/planetary/label_text.h"
 #include "isohf/base/bytes.h"

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <span>
 
-#include "formats/files/raw_file.h"
-#include "formats/files/text.h"
+#include "formats/io/raw_file.h"
+#include "formats/io/text.h"
 #include "isohf/error.h"
 
 namespace isohf {

@@ -18,11 +18,11 @@
 #include <vector>
 
 #include "formats/binary_grids/plain_samples.h"
-#include "formats/files/bands.h"
-#include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/map_wkt.h"
 #include "formats/georeference/units.h"
+#include "formats/io/bands.h"
+#include "formats/io/text.h"
 #include "formats/open_options.h"
 #include "formats/planetary/label_text.h"
 #include "isohf/error.h"

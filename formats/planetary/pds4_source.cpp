@@ -15,13 +15,13 @@
 #include <vector>
 
 #include "formats/binary_grids/described_source.h"
-#include "formats/files/bands.h"
-#include "formats/files/text.h"
-#include "formats/files/text_tokens.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/map_wkt.h"
 #include "formats/georeference/reference_system.h"
 #include "formats/georeference/units.h"
+#include "formats/io/bands.h"
+#include "formats/io/text.h"
+#include "formats/io/text_tokens.h"
 #include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/projection/reference_map.h"

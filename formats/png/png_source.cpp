@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "formats/decorate/masked_source.h"
-#include "formats/files/file_source.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/raster_description.h"
+#include "formats/io/file_source.h"
 #include "formats/open_options.h"
 #include "formats/png/packed_elevations.h"
 #include "formats/png/png_decoder.h"

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <string>
 
-#include "formats/files/text.h"
+#include "formats/io/text.h"
 #include "formats/png/png_decoder.h"
 #include "formats/readers.h"
 

@@ -14,10 +14,10 @@
 #include <vector>
 
 #include "formats/binary_grids/plain_samples.h"
-#include "formats/files/bands.h"
-#include "formats/files/text.h"
-#include "formats/files/text_tokens.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/io/bands.h"
+#include "formats/io/text.h"
+#include "formats/io/text_tokens.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "isohf/base/bytes.h"

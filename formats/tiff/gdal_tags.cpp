@@ -8,8 +8,8 @@
 #include <string_view>
 #include <system_error>
 
-#include "formats/files/text.h"
 #include "formats/georeference/units.h"
+#include "formats/io/text.h"
 #include "formats/open_options.h"
 
 namespace isohf {

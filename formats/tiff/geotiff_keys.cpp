@@ -10,11 +10,11 @@
 #include <optional>
 #include <utility>
 
-#include "formats/files/text.h"
 #include "formats/georeference/map_wkt.h"
 #include "formats/georeference/reference_system.h"
 #include "formats/georeference/units.h"
 #include "formats/georeference/wkt.h"
+#include "formats/io/text.h"
 #include "isohf/error.h"
 
 namespace isohf {

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "formats/files/raw_file.h"
+#include "formats/io/raw_file.h"
 #include "formats/tiff/tiff_file.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"

@@ -11,8 +11,8 @@
 #include <unordered_map>
 #include <vector>
 
-#include "formats/files/block_cache.h"
-#include "formats/files/raw_file.h"
+#include "formats/io/block_cache.h"
+#include "formats/io/raw_file.h"
 #include "formats/tiff/tiff_file.h"
 #include "isohf/raster.h"
 

@@ -18,8 +18,8 @@
 #include <span>
 #include <utility>
 
-#include "formats/files/raw_file.h"
-#include "formats/files/text.h"
+#include "formats/io/raw_file.h"
+#include "formats/io/text.h"
 #include "formats/readers.h"
 #include "formats/tiff/gdal_tags.h"
 #include "isohf/base/bytes.h"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/files/raw_file.h"
+#include "formats/io/raw_file.h"
 #include "formats/tiff/geotiff_keys.h"
 
 namespace isohf {

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "formats/files/inflated_bytes.h"
-#include "formats/files/raw_file.h"
-#include "formats/files/text.h"
+#include "formats/io/inflated_bytes.h"
+#include "formats/io/raw_file.h"
+#include "formats/io/text.h"
 #include "formats/png/packed_elevations.h"
 #include "formats/readers.h"
 #include "formats/tiles/tile_store.h"

@@ -19,9 +19,9 @@
 #include <utility>
 #include <vector>
 
-#include "formats/files/block_cache.h"
-#include "formats/files/file_source.h"
-#include "formats/files/text.h"
+#include "formats/io/block_cache.h"
+#include "formats/io/file_source.h"
+#include "formats/io/text.h"
 #include "formats/open_options.h"
 #include "formats/png/packed_elevations.h"
 #include "formats/png/png_decoder.h"

@@ -9,10 +9,10 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/reference_system.h"
 #include "formats/georeference/units.h"
+#include "formats/io/text.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
 

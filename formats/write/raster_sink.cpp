@@ -7,7 +7,7 @@
 #include <limits>
 #include <span>
 
-#include "formats/files/text.h"
+#include "formats/io/text.h"
 #include "formats/readers.h"
 #include "formats/write/encoders.h"
 #include "isohf/base/output_file.h"

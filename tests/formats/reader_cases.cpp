@@ -4,9 +4,9 @@
 
 #include <cstring>
 
-#include "formats/files/tar_archive.h"
-#include "formats/files/zip_archive.h"
 #include "formats/grids/netcdf_bytes.h"
+#include "formats/io/tar_archive.h"
+#include "formats/io/zip_archive.h"
 #include "formats/planetary/pds4_label.h"
 #include "formats/readers.h"
 #include "formats/tiff/tiff_bytes.h"

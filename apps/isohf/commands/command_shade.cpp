@@ -10,8 +10,8 @@
 #include <optional>
 
 #include "commands/command.h"
-#include "formats/files/text.h"
 #include "formats/georeference/units.h"
+#include "formats/io/text.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/error.h"
 #include "isohf/shade.h"

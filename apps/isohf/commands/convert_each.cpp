@@ -14,7 +14,7 @@
 #include <thread>
 #include <variant>
 
-#include "formats/files/text.h"
+#include "formats/io/text.h"
 #include "isohf/base/file.h"
 #include "options/describe.h"
 #include "options/input_files.h"

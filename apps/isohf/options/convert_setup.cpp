@@ -10,8 +10,8 @@
 #include <optional>
 #include <set>
 
-#include "formats/files/file_stamp.h"
-#include "formats/files/text.h"
+#include "formats/io/file_stamp.h"
+#include "formats/io/text.h"
 #include "interrupt.h"
 #include "isohf/archive.h"
 #include "isohf/archive/metadata/accuracy_info.h"

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "formats/files/text.h"
+#include "formats/io/text.h"
 #include "formats/readers.h"
 #include "formats/registry.h"
 #include "isohf/error.h"

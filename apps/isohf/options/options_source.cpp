@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "formats/files/text.h"
+#include "formats/io/text.h"
 #include "formats/readers.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"

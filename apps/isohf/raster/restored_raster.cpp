@@ -8,9 +8,9 @@
 #include <limits>
 #include <utility>
 
-#include "formats/files/text.h"
 #include "formats/georeference/reference_system.h"
 #include "formats/georeference/units.h"
+#include "formats/io/text.h"
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "output/standard_output.h"

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <sstream>
 
-#include "formats/files/zip_archive.h"
 #include "formats/grids/netcdf_bytes.h"
+#include "formats/io/zip_archive.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 

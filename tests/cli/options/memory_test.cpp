@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
-#include "formats/files/gzipped.h"
+#include "formats/io/gzipped.h"
 #include "support/run_program.h"
 #include "support/sanitizers.h"
 #include "support/temporary_folder.h"

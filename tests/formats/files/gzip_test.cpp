@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <random>
 
-#include "formats/files/gzipped.h"
-#include "formats/files/raw_file.h"
-#include "formats/files/zip_archive.h"
+#include "formats/io/gzipped.h"
+#include "formats/io/raw_file.h"
+#include "formats/io/zip_archive.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "isohf/raster.h"

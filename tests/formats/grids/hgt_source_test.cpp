@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "formats/files/zip_archive.h"
+#include "formats/io/zip_archive.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/rasters/every_window.h"

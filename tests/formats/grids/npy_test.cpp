@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "formats/files/zip_archive.h"
+#include "formats/io/zip_archive.h"
 #include "formats/reader_failure.h"
 #include "formats/readers.h"
 #include "isohf/error.h"

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "formats/files/gzipped.h"
+#include "formats/io/gzipped.h"
 #include "formats/mosaic/mosaic_source.h"
 #include "isohf/raster.h"
 #include "support/rasters/samples.h"

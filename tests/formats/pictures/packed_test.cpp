@@ -11,9 +11,9 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "formats/files/gzipped.h"
-#include "formats/files/tar_archive.h"
-#include "formats/files/zip_archive.h"
+#include "formats/io/gzipped.h"
+#include "formats/io/tar_archive.h"
+#include "formats/io/zip_archive.h"
 #include "formats/reader_failure.h"
 #include "formats/readers.h"
 #include "formats/registry.h"

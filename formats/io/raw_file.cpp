@@ -1,4 +1,4 @@
-#include "formats/files/raw_file.h"
+#include "formats/io/raw_file.h"
 
 #include <fmt/core.h>
 #include <sys/stat.h>
@@ -10,7 +10,7 @@
 #include <optional>
 #include <vector>
 
-#include "formats/files/text.h"
+#include "formats/io/text.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
 

@@ -1,4 +1,4 @@
-#include "formats/files/inflated_bytes.h"
+#include "formats/io/inflated_bytes.h"
 
 #include <fmt/core.h>
 #include <libdeflate.h>

@@ -1,12 +1,12 @@
-#include "formats/files/bands.h"
+#include "formats/io/bands.h"
 
 #include <fmt/core.h>
 
 #include <algorithm>
 #include <charconv>
 
-#include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/io/text.h"
 #include "isohf/error.h"
 
 namespace isohf {

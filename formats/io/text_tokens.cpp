@@ -1,4 +1,4 @@
-#include "formats/files/text_tokens.h"
+#include "formats/io/text_tokens.h"
 
 #include <fmt/core.h>
 
@@ -8,7 +8,7 @@
 #include <cstring>
 #include <limits>
 
-#include "formats/files/text.h"
+#include "formats/io/text.h"
 #include "isohf/error.h"
 
 namespace isohf {

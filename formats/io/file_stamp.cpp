@@ -1,4 +1,4 @@
-#include "formats/files/file_stamp.h"
+#include "formats/io/file_stamp.h"
 
 #include <fmt/format.h>
 #include <sys/stat.h>

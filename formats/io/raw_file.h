@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/files/inflated_bytes.h"
+#include "formats/io/inflated_bytes.h"
 #include "isohf/base/file.h"
 #include "isohf/base/zip.h"
 

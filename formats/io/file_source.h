@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "formats/files/raw_file.h"
+#include "formats/io/raw_file.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"

@@ -20,8 +20,8 @@
 #include <utility>
 #include <vector>
 
-#include "formats/files/raw_file.h"
-#include "formats/files/text.h"
+#include "formats/io/raw_file.h"
+#include "formats/io/text.h"
 #include "formats/mosaic/mosaic_source.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"

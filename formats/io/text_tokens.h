@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/files/raw_file.h"
+#include "formats/io/raw_file.h"
 #include "isohf/raster.h"
 
 namespace isohf {

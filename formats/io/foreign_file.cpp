@@ -1,4 +1,4 @@
-#include "formats/files/foreign_file.h"
+#include "formats/io/foreign_file.h"
 
 #include <fmt/format.h>
 
@@ -10,8 +10,8 @@
 #include <string_view>
 #include <utility>
 
-#include "formats/files/text.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/io/text.h"
 
 namespace isohf {
 namespace {
