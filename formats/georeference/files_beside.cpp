@@ -21,9 +21,9 @@
 
 #include "formats/georeference/reference_system.h"
 #include "formats/georeference/wkt.h"
+#include "formats/geotiff/gdal_tags.h"
 #include "formats/io/raw_file.h"
 #include "formats/io/text.h"
-#include "formats/tiff/gdal_tags.h"
 #include "isohf/error.h"
 
 namespace isohf {

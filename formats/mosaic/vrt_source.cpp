@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "formats/georeference/files_beside.h"
+#include "formats/geotiff/gdal_tags.h"
 #include "formats/io/bands.h"
 #include "formats/io/file_source.h"
 #include "formats/io/text.h"
@@ -26,7 +27,6 @@
 #include "formats/mosaic/strip_reader.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
-#include "formats/tiff/gdal_tags.h"
 #include "isohf/base/file.h"
 #include "isohf/base/sample.h"
 #include "isohf/error.h"

@@ -6,11 +6,11 @@
 #include <memory>
 #include <vector>
 
+#include "formats/geotiff/geotiff_keys.h"
+#include "formats/geotiff/tiff_blocks.h"
+#include "formats/geotiff/tiff_file.h"
 #include "formats/io/raw_file.h"
 #include "formats/photo/photo.h"
-#include "formats/tiff/geotiff_keys.h"
-#include "formats/tiff/tiff_blocks.h"
-#include "formats/tiff/tiff_file.h"
 #include "isohf/error.h"
 
 namespace isohf {

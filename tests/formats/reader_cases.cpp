@@ -4,12 +4,12 @@
 
 #include <cstring>
 
+#include "formats/geotiff/tiff_bytes.h"
 #include "formats/grids/netcdf_bytes.h"
 #include "formats/io/tar_archive.h"
 #include "formats/io/zip_archive.h"
 #include "formats/planetary/pds4_label.h"
 #include "formats/readers.h"
-#include "formats/tiff/tiff_bytes.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/raster.h"
 #include "support/rasters/place_at.h"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/tiff/tiff_bytes.h"
+#include "formats/geotiff/tiff_bytes.h"
 #include "support/rasters/degree_grid.h"
 #include "support/rasters/small_geoid.h"
 #include "support/run_program.h"

@@ -12,11 +12,11 @@
 #include <vector>
 
 #include "formats/georeference/wkt.h"
+#include "formats/geotiff/geotiff_keys.h"
 #include "formats/grids/netcdf_bytes.h"
 #include "formats/mosaic/mosaic_pieces.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
-#include "formats/tiff/geotiff_keys.h"
 #include "isohf/convert.h"
 #include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"

@@ -5,9 +5,9 @@
 #include <array>
 #include <fstream>
 
+#include "formats/geotiff/tiff_bytes.h"
 #include "formats/photo/photo.h"
 #include "formats/reader_failure.h"
-#include "formats/tiff/tiff_bytes.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/archive/textures/picture_codec.h"
 #include "isohf/error.h"

@@ -11,13 +11,13 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "formats/geotiff/tiff_bytes.h"
 #include "formats/io/gzipped.h"
 #include "formats/io/tar_archive.h"
 #include "formats/io/zip_archive.h"
 #include "formats/reader_failure.h"
 #include "formats/readers.h"
 #include "formats/registry.h"
-#include "formats/tiff/tiff_bytes.h"
 #include "isohf/raster.h"
 #include "support/rasters/raster.h"
 #include "support/rasters/samples.h"

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <fstream>
 
+#include "formats/geotiff/tiff_bytes.h"
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
-#include "formats/tiff/tiff_bytes.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/rasters/memory_photo.h"

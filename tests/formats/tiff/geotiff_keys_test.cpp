@@ -1,4 +1,4 @@
-#include "formats/tiff/geotiff_keys.h"
+#include "formats/geotiff/geotiff_keys.h"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "formats/geotiff/tiff_bytes.h"
 #include "formats/readers.h"
-#include "formats/tiff/tiff_bytes.h"
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "support/rasters/memory_source.h"

@@ -5,8 +5,8 @@
 #include <sys/resource.h>
 #include <zlib.h>
 
+#include "formats/geotiff/tiff_bytes.h"
 #include "formats/readers.h"
-#include "formats/tiff/tiff_bytes.h"
 #include "isohf/error.h"
 #include "support/temporary_folder.h"
 

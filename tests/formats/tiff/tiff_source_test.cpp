@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "formats/tiff/tiff_bytes.h"
+#include "formats/geotiff/tiff_bytes.h"
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"

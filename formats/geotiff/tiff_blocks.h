@@ -11,9 +11,9 @@
 #include <unordered_map>
 #include <vector>
 
+#include "formats/geotiff/tiff_file.h"
 #include "formats/io/block_cache.h"
 #include "formats/io/raw_file.h"
-#include "formats/tiff/tiff_file.h"
 #include "isohf/raster.h"
 
 namespace isohf {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "formats/geotiff/geotiff_keys.h"
 #include "formats/io/raw_file.h"
-#include "formats/tiff/geotiff_keys.h"
 
 namespace isohf {
 

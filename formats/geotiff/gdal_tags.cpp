@@ -1,4 +1,4 @@
-#include "formats/tiff/gdal_tags.h"
+#include "formats/geotiff/gdal_tags.h"
 
 #include <fmt/core.h>
 

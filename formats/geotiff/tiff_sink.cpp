@@ -19,8 +19,8 @@
 #include <vector>
 
 #include "formats/georeference/units.h"
-#include "formats/tiff/gdal_tags.h"
-#include "formats/tiff/geotiff_keys.h"
+#include "formats/geotiff/gdal_tags.h"
+#include "formats/geotiff/geotiff_keys.h"
 #include "formats/write/encoders.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"

@@ -1,4 +1,4 @@
-#include "formats/tiff/tiff_blocks.h"
+#include "formats/geotiff/tiff_blocks.h"
 
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "formats/geotiff/tiff_file.h"
 #include "formats/io/raw_file.h"
-#include "formats/tiff/tiff_file.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"

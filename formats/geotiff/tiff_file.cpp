@@ -1,4 +1,4 @@
-#include "formats/tiff/tiff_file.h"
+#include "formats/geotiff/tiff_file.h"
 
 #include <fmt/core.h>
 #include <sys/mman.h>
@@ -18,10 +18,10 @@
 #include <span>
 #include <utility>
 
+#include "formats/geotiff/gdal_tags.h"
 #include "formats/io/raw_file.h"
 #include "formats/io/text.h"
 #include "formats/readers.h"
-#include "formats/tiff/gdal_tags.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
