@@ -17,7 +17,6 @@
 #include <utility>
 #include <vector>
 
-#include "formats/binary_grids/plain_samples.h"
 #include "formats/decorate/masked_source.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/units.h"
@@ -25,6 +24,7 @@
 #include "formats/geotiff/geotiff_keys.h"
 #include "formats/geotiff/tiff_blocks.h"
 #include "formats/geotiff/tiff_file.h"
+#include "formats/grids/plain_samples.h"
 #include "formats/io/bands.h"
 #include "formats/io/raw_file.h"
 #include "formats/io/text.h"

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/binary_grids/described_source.h"
+#include "formats/grids/described_source.h"
 #include "formats/io/text.h"
 #include "formats/netcdf/cf_file.h"
 #include "formats/readers.h"

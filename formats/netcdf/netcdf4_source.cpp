@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "formats/binary_grids/plain_samples.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/grids/plain_samples.h"
 #include "formats/io/text.h"
 #include "formats/module_loader.h"
 #include "formats/netcdf/cf_file.h"

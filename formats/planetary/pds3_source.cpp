@@ -17,10 +17,10 @@
 #include <tuple>
 #include <vector>
 
-#include "formats/binary_grids/plain_samples.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/map_wkt.h"
 #include "formats/georeference/units.h"
+#include "formats/grids/plain_samples.h"
 #include "formats/io/bands.h"
 #include "formats/io/text.h"
 #include "formats/open_options.h"

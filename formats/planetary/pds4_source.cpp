@@ -14,11 +14,11 @@
 #include <utility>
 #include <vector>
 
-#include "formats/binary_grids/described_source.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/map_wkt.h"
 #include "formats/georeference/reference_system.h"
 #include "formats/georeference/units.h"
+#include "formats/grids/described_source.h"
 #include "formats/io/bands.h"
 #include "formats/io/text.h"
 #include "formats/io/text_tokens.h"

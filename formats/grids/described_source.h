@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "formats/binary_grids/plain_samples.h"
+#include "formats/grids/plain_samples.h"
 #include "isohf/raster.h"
 
 namespace isohf {

@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/binary_grids/plain_samples.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/grids/plain_samples.h"
 #include "formats/io/bands.h"
 #include "formats/io/file_source.h"
 #include "formats/io/text.h"

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "formats/binary_grids/described_source.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/units.h"
+#include "formats/grids/described_source.h"
 #include "formats/io/bands.h"
 #include "formats/io/text.h"
 #include "formats/readers.h"

@@ -13,8 +13,8 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/binary_grids/grid_header.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/grids/grid_header.h"
 #include "formats/io/bands.h"
 #include "formats/io/file_source.h"
 #include "formats/io/text.h"

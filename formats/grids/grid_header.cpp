@@ -1,4 +1,4 @@
-#include "formats/binary_grids/grid_header.h"
+#include "formats/grids/grid_header.h"
 
 #include <fmt/core.h>
 

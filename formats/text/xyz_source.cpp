@@ -13,8 +13,8 @@
 #include <unordered_map>
 #include <vector>
 
-#include "formats/binary_grids/plain_samples.h"
 #include "formats/georeference/files_beside.h"
+#include "formats/grids/plain_samples.h"
 #include "formats/io/bands.h"
 #include "formats/io/text.h"
 #include "formats/io/text_tokens.h"

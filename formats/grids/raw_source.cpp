@@ -9,10 +9,10 @@
 #include <limits>
 #include <vector>
 
-#include "formats/binary_grids/grid_header.h"
-#include "formats/binary_grids/plain_samples.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/raster_description.h"
+#include "formats/grids/grid_header.h"
+#include "formats/grids/plain_samples.h"
 #include "formats/io/bands.h"
 #include "formats/io/file_source.h"
 #include "formats/io/raw_file.h"

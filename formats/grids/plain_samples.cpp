@@ -1,4 +1,4 @@
-#include "formats/binary_grids/plain_samples.h"
+#include "formats/grids/plain_samples.h"
 
 #include <fmt/core.h>
 

@@ -1,4 +1,4 @@
-#include "formats/binary_grids/described_source.h"
+#include "formats/grids/described_source.h"
 
 #include <fmt/core.h>
 
