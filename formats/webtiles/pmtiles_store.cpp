@@ -15,7 +15,7 @@
 #include "formats/io/text.h"
 #include "formats/png/packed_elevations.h"
 #include "formats/readers.h"
-#include "formats/tiles/tile_store.h"
+#include "formats/webtiles/tile_store.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
 

@@ -26,7 +26,7 @@
 #include "formats/png/packed_elevations.h"
 #include "formats/png/png_decoder.h"
 #include "formats/readers.h"
-#include "formats/tiles/tile_store.h"
+#include "formats/webtiles/tile_store.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
