@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-#include "formats/decorate/masked_source.h"
+#include "formats/adapters/masked_source.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/units.h"
 #include "formats/geotiff/gdal_tags.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/decorate/cropped_source.h"
+#include "formats/adapters/cropped_source.h"
 #include "formats/io/file_stamp.h"
 #include "formats/mosaic/mosaic_samples.h"
 #include "isohf/projection/reference_map.h"

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "formats/decorate/masked_source.h"
+#include "formats/adapters/masked_source.h"
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/raster_description.h"
 #include "formats/io/file_source.h"

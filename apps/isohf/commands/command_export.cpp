@@ -10,7 +10,7 @@
 
 #include "commands/command.h"
 #include "commands/export_tiles.h"
-#include "formats/decorate/cropped_source.h"
+#include "formats/adapters/cropped_source.h"
 #include "formats/georeference/reference_system.h"
 #include "formats/io/text.h"
 #include "isohf/convert/frame/source_frame.h"

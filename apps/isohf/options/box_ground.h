@@ -1,6 +1,6 @@
 #pragma once
 
-#include "formats/decorate/cropped_source.h"
+#include "formats/adapters/cropped_source.h"
 #include "isohf/archive.h"
 #include "isohf/restore/sample_grids.h"
 

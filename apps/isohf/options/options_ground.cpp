@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "formats/decorate/windowed_source.h"
+#include "formats/adapters/windowed_source.h"
 #include "isohf/convert/frame/source_frame.h"
 #include "options/options_source.h"
 

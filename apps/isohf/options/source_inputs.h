@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "formats/decorate/cropped_source.h"
+#include "formats/adapters/cropped_source.h"
 #include "formats/mosaic/mosaic_source.h"
 #include "formats/registry.h"
 #include "isohf/convert.h"

@@ -1,4 +1,4 @@
-#include "formats/decorate/cropped_source.h"
+#include "formats/adapters/cropped_source.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

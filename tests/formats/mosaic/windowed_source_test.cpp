@@ -1,4 +1,4 @@
-#include "formats/decorate/windowed_source.h"
+#include "formats/adapters/windowed_source.h"
 
 #include <gtest/gtest.h>
 

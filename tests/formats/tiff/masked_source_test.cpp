@@ -1,4 +1,4 @@
-#include "formats/decorate/masked_source.h"
+#include "formats/adapters/masked_source.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "formats/decorate/cropped_source.h"
+#include "formats/adapters/cropped_source.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "formats/decorate/windowed_source.h"
+#include "formats/adapters/windowed_source.h"
 #include "isohf/error.h"
 
 namespace isohf {
