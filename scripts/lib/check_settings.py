@@ -3,13 +3,13 @@
 
 The library knows no option: no string literal of libisohf/ or formats/ holds one ("--name"), unless its line says
 NOLINT. A message names a setting by an identifier between backticks, and the table of spellings in
-apps/command_line/output/standard_output.cpp has each of these, and no other. Prints findings, one a line.
+apps/common/output/standard_output.cpp has each of these, and no other. Prints findings, one a line.
 """
 import re
 import sys
 from pathlib import Path
 
-TABLE = Path('apps/command_line/output/standard_output.cpp')
+TABLE = Path('apps/common/output/standard_output.cpp')
 LITERAL = re.compile(r'"((?:[^"\\\n]|\\.)*)"')
 
 

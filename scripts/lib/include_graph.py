@@ -19,7 +19,7 @@ def sources(folders):
 
 def resolve(name, file, known):
     """The file that an include in quotes names: beside the including file, or below one of the roots."""
-    roots = [os.path.dirname(file), "", "libisohf", "libisohf/include", "apps/command_line"]
+    roots = [os.path.dirname(file), "", "libisohf", "libisohf/include", "apps/common"]
     roots += ["/".join(file.split("/")[:2])] if file.startswith("apps/") else []
     return next((path for path in (os.path.normpath(os.path.join(root, name)) for root in roots) if path in known), None)
 
