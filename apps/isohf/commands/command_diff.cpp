@@ -13,8 +13,8 @@
 #include "options/options_common.h"
 #include "output/json_output.h"
 #include "output/output_kinds.h"
+#include "output/restored_raster.h"
 #include "output/standard_output.h"
-#include "raster/restored_raster.h"
 
 namespace isohf::cli {
 namespace {

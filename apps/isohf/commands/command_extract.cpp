@@ -6,10 +6,10 @@
 #include <optional>
 
 #include "commands/command.h"
+#include "input/box_ground.h"
 #include "isohf/error.h"
 #include "isohf/parts.h"
 #include "open_archive.h"
-#include "options/box_ground.h"
 #include "options/option_values.h"
 #include "options/options_common.h"
 #include "options/tile_range.h"

@@ -15,9 +15,9 @@
 #include <variant>
 
 #include "formats/io/text.h"
+#include "input/input_files.h"
 #include "isohf/base/file.h"
 #include "options/describe.h"
-#include "options/input_files.h"
 #include "output/json_output.h"
 #include "output/standard_output.h"
 

@@ -8,10 +8,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "input/input_files.h"
 #include "isohf/error.h"
 #include "isohf/shards.h"
 #include "options/describe.h"
-#include "options/input_files.h"
 #include "output/json_output.h"
 #include "output/output_kinds.h"
 #include "output/standard_output.h"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "options/convert_setup.h"
+#include "input/convert_setup.h"
 
 namespace isohf::cli {
 

@@ -5,10 +5,10 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "input/source_size.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/convert/memory_plan.h"
 #include "options/describe.h"
-#include "options/source_size.h"
 #include "output/accuracy_output.h"
 #include "output/json_output.h"
 #include "output/standard_output.h"

@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "input/source_place.h"
 #include "interrupt.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/base/file.h"
@@ -18,7 +19,6 @@
 #include "isohf/sampling/source/source_rows.h"
 #include "isohf/sampling/source/source_statistics.h"
 #include "options/describe.h"
-#include "options/source_place.h"
 #include "output/json_output.h"
 #include "output/progress.h"
 #include "output/standard_output.h"

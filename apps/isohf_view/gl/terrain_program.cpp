@@ -13,7 +13,7 @@ std::string header(bool rim) {
 // near the eye becomes a float, by the same operations for every tile, so that two tiles put a shared vertex in exactly
 // one place and no crack can open between them.
 //
-// Normals: paper Eqs. 10-11 with errata E5-E10, for the four kinds of fan of isohf/surface/normals.h. Differences of
+// Normals: paper Eqs. 10-11 with errata E5-E10, for the four kinds of fan of isohf/light/normals.h. Differences of
 // codes are exact in integers, so both tiles of an edge also get the same normal, bit for bit. Codes are fetched by the
 // vertex's number v:
 //

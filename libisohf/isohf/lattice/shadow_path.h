@@ -8,7 +8,7 @@
 #include "isohf/lattice.h"
 
 /// The paths along which light casts shadows: rows of visible vertices, followed eastwards or westwards (paper section
-/// 3.13). Pure geometry and plain data; casting is in surface/shadow.h.
+/// 3.13). Pure geometry and plain data; casting is in light/shadow.h.
 ///
 ///   row r odd    #-----o-----o---- ... -----#     ordinals 0, 1, ... C-4 from either edge, 2 half steps apart
 ///   row r even   s--o-----o---- ... -----o--s     ordinals 0, 1, ... C-3; the first and last step is one half step

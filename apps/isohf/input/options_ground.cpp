@@ -1,11 +1,11 @@
-#include "options/options_ground.h"
+#include "input/options_ground.h"
 
 #include <algorithm>
 #include <vector>
 
 #include "formats/adapters/windowed_source.h"
+#include "input/options_source.h"
 #include "isohf/convert/frame/source_frame.h"
-#include "options/options_source.h"
 
 namespace isohf::cli {
 

@@ -1,4 +1,4 @@
-#include "options/convert_setup.h"
+#include "input/convert_setup.h"
 
 #include <fmt/format.h>
 #include <sys/resource.h>
@@ -12,6 +12,13 @@
 
 #include "formats/io/file_stamp.h"
 #include "formats/io/text.h"
+#include "input/input_files.h"
+#include "input/options_ground.h"
+#include "input/options_lattice.h"
+#include "input/options_source.h"
+#include "input/options_texture.h"
+#include "input/source_inputs.h"
+#include "input/source_size.h"
 #include "interrupt.h"
 #include "isohf/archive.h"
 #include "isohf/archive/metadata/accuracy_info.h"
@@ -25,15 +32,8 @@
 #include "isohf/raster.h"
 #include "isohf/resampling.h"
 #include "options/describe.h"
-#include "options/input_files.h"
 #include "options/option_values.h"
 #include "options/options_common.h"
-#include "options/options_ground.h"
-#include "options/options_lattice.h"
-#include "options/options_source.h"
-#include "options/options_texture.h"
-#include "options/source_inputs.h"
-#include "options/source_size.h"
 #include "output/accuracy_output.h"
 #include "output/json_output.h"
 #include "output/output_kinds.h"

@@ -1,4 +1,4 @@
-#include "options/options_texture.h"
+#include "input/options_texture.h"
 
 #include <fmt/format.h>
 

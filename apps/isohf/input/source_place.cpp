@@ -1,4 +1,4 @@
-#include "options/source_place.h"
+#include "input/source_place.h"
 
 #include <fmt/format.h>
 

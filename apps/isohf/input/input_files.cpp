@@ -1,4 +1,4 @@
-#include "options/input_files.h"
+#include "input/input_files.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

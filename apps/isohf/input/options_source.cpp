@@ -1,4 +1,4 @@
-#include "options/options_source.h"
+#include "input/options_source.h"
 
 #include <cctype>
 #include <cmath>
@@ -7,11 +7,11 @@
 
 #include "formats/io/text.h"
 #include "formats/readers.h"
+#include "input/quantities.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "options/option_values.h"
-#include "options/quantities.h"
 
 namespace isohf::cli {
 

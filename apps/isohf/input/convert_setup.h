@@ -7,14 +7,14 @@
 #include <vector>
 
 #include "commands/convert_each.h"
+#include "input/options_ground.h"
+#include "input/options_source.h"
+#include "input/options_texture.h"
+#include "input/source_inputs.h"
 #include "isohf/convert.h"
 #include "isohf/raster.h"
 #include "isohf/shards.h"
 #include "options/options_common.h"
-#include "options/options_ground.h"
-#include "options/options_source.h"
-#include "options/options_texture.h"
-#include "options/source_inputs.h"
 
 namespace isohf::cli {
 

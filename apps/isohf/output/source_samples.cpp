@@ -1,4 +1,4 @@
-#include "raster/source_samples.h"
+#include "output/source_samples.h"
 
 #include <fmt/format.h>
 
@@ -11,8 +11,8 @@
 #include "isohf/error.h"
 #include "isohf/restore/sample_grids.h"
 #include "isohf/surface.h"
+#include "output/restored_raster.h"
 #include "output/standard_output.h"
-#include "raster/restored_raster.h"
 
 namespace isohf::cli {
 

@@ -1,4 +1,4 @@
-#include "options/source_inputs.h"
+#include "input/source_inputs.h"
 
 #include <fmt/format.h>
 
@@ -7,12 +7,12 @@
 #include <filesystem>
 #include <span>
 
+#include "input/options_ground.h"
+#include "input/options_source.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "options/option_values.h"
-#include "options/options_ground.h"
-#include "options/options_source.h"
 #include "work_arena.h"
 
 namespace isohf::cli {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "surface/shadow_world.h"
+#include "light/shadow_world.h"
 
 namespace isohf {
 namespace {

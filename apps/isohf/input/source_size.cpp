@@ -1,4 +1,4 @@
-#include "options/source_size.h"
+#include "input/source_size.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "raster/restored_raster.h"
+#include "output/restored_raster.h"
 
 #include <fmt/format.h>
 

@@ -1,11 +1,11 @@
-#include "options/options_lattice.h"
+#include "input/options_lattice.h"
 
 #include <limits>
 
+#include "input/quantities.h"
 #include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
 #include "options/option_values.h"
-#include "options/quantities.h"
 
 namespace isohf::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "options/box_ground.h"
+#include "input/box_ground.h"
 
 #include <fmt/format.h>
 

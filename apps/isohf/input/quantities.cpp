@@ -1,4 +1,4 @@
-#include "options/quantities.h"
+#include "input/quantities.h"
 
 #include <fmt/format.h>
 
