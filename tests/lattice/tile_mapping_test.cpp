@@ -2,12 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <limits>
-#include <random>
 #include <set>
 
-#include "lattice/grid_point.h"
 #include "lattice/mesh_check.h"
 
 namespace isohf {
@@ -44,20 +40,6 @@ TEST(TileMapping, SlidVerticesAreTheOnesOffTheInfiniteLattice) {
       for (int c = 0; c < shape.columns(); ++c) {
         const ObjectVertex p = object_from_grid(shape, GridVertex{c, r});
         ASSERT_EQ(is_slid(shape, {c, r}), (p.x + p.z) % 2 != 0) << c << "," << r;
-      }
-    }
-  }
-}
-
-TEST(TileMapping, InverseReturnsEveryVisibleVertex) {
-  for (const TileShape& shape : deepest_shapes(24, 19)) {
-    for (int r = 1; r <= shape.rows() - 2; ++r) {
-      for (int c = 1; c < shape.columns(); ++c) {
-        if (!is_visible(shape, {c, r})) continue;
-        const ObjectVertex p = object_from_grid(shape, GridVertex{c, r});
-        const GridPoint back = grid_from_object(shape, ObjectPoint{static_cast<double>(p.x), static_cast<double>(p.z)});
-        ASSERT_EQ(back.column, c);
-        ASSERT_EQ(back.row, r);
       }
     }
   }
@@ -104,21 +86,6 @@ TEST(Errata, E05PaddingLiesOnTheNeighboursVertices) {
     EXPECT_EQ(object_from_grid(shape, GridVertex{0, 2}).x, -1);
     EXPECT_EQ(object_from_grid(shape, GridVertex{shape.columns() - 1, 2}).x, width + 1);
   }
-}
-
-TEST(Errata, E12TheInverseOfEq1IsPiecewiseNearTheStraightEdges) {
-  const TileShape shape = TileShape::make(8, 9, 1);
-  // Inverting Eq. 1's ordinary case everywhere puts the slid vertex (1, 2) at column 1.5.
-  const auto ordinary_column = [](double x, double even_share) { return (x + even_share) / 2.0 + 1.0; };
-  EXPECT_EQ(ordinary_column(0.0, 1.0), 1.5);
-  EXPECT_EQ(grid_from_object(shape, ObjectPoint{0.0, 1.0}).column, 1.0);
-  EXPECT_EQ(ordinary_column(8.0, 1.0), 5.5);
-  EXPECT_EQ(grid_from_object(shape, ObjectPoint{8.0, 1.0}).column, 6.0);
-  // Halfway along the West half triangle's sides and on its border with the ordinary triangles.
-  EXPECT_EQ(grid_from_object(shape, ObjectPoint{0.0, 0.5}).column, 1.0);
-  EXPECT_EQ(grid_from_object(shape, ObjectPoint{0.25, 0.5}).column, 1.25);
-  EXPECT_EQ(grid_from_object(shape, ObjectPoint{0.5, 0.5}).column, 1.5);
-  EXPECT_EQ(ordinary_column(0.5, 0.5), 1.5);
 }
 
 }  // namespace
