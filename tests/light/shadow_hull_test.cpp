@@ -78,38 +78,6 @@ TEST(ShadowHull, SeedsEqualTheDefinitionOverFiftyTiles) {
   }
 }
 
-TEST(ShadowHull, WholeTilesFromSeedsEqualTilesFromTheSweep) {
-  const ShadowWorld world(TileShape::make(21, 23, 1), 9, 17.0, Terrain::kHoles, 9);
-  const TileShape& shape = world.shape();
-  const double fall_min = 3.0;
-  for (const LightTravel travel : kBothTravels) {
-    const std::vector<CasterRows> entering = carry(world, travel, fall_min);
-    for (const double fall : {3.0, 11.0, 250.0, 9000.0}) {
-      const ShadowLight light{travel, fall / world.grid.sigma_x()};
-      std::vector<double> handed(static_cast<std::size_t>(visible_rows(shape)), kNoShadow);
-      for (std::int64_t i = 0; i < world.grid.tile_columns(); ++i) {
-        const std::int64_t tile = travel == LightTravel::kEastward ? i : world.grid.tile_columns() - 1 - i;
-        const std::vector<float> heights = world.tile_heights(tile);
-        const View2D<const float> view(heights.data(), shape.columns(), shape.rows());
-        std::vector<double> seeds;
-        for (int row = 1; row <= visible_rows(shape); ++row) {
-          seeds.push_back(shadow_height_from(entering[static_cast<std::size_t>(tile)].row(row), fall));
-        }
-        std::vector<float> by_sweep(heights.size());
-        std::vector<float> by_seeds(heights.size());
-        tile_shadow(world.grid, view, light, handed, {by_sweep.data(), shape.columns(), shape.rows()}, handed);
-        tile_shadow(world.grid, view, light, seeds, {by_seeds.data(), shape.columns(), shape.rows()}, {});
-        for (std::size_t k = 0; k < heights.size(); ++k) {
-          if (by_sweep[k] == by_seeds[k]) continue;
-          if (by_sweep[k] <= 0.0F && by_seeds[k] <= 0.0F) continue;
-          // The sweep's S has one rounding a tile more, of numbers up to 65535 + fall across the tile.
-          ASSERT_NEAR(by_sweep[k], by_seeds[k], 0.02) << "tile " << tile << " fall " << fall;
-        }
-      }
-    }
-  }
-}
-
 TEST(ShadowHull, EveryCasterListedMatters) {
   const ShadowWorld world(TileShape::make(21, 23, 1), 6, 17.0, Terrain::kRidges, 21);
   const double fall_min = 2.0;

@@ -82,30 +82,6 @@ TEST(TileShadow, CarriesShadowsOverFiftyTilesWithoutAddingUpRoundings) {
   for (const LightTravel travel : kBothTravels) expect_equal_to_definition(world, {travel, 0.0123});
 }
 
-TEST(TileShadow, FallsAsTheSunRises) {
-  const ShadowWorld world(TileShape::make(12, 11, 1), 3, 8000.0, Terrain::kHoles, 3);
-  for (const LightTravel travel : kBothTravels) {
-    auto before = sweep(world, {travel, 1e-3});
-    for (double fall = 2e-3; fall < 1e3; fall *= 1.7) {
-      const auto now = sweep(world, {travel, fall});
-      for (std::size_t tile = 0; tile < now.size(); ++tile) {
-        for (std::size_t i = 0; i < now[tile].size(); ++i) ASSERT_LE(now[tile][i], before[tile][i]) << fall;
-      }
-      before = now;
-    }
-  }
-}
-
-TEST(TileShadow, IsTheSurfaceItselfUnderAHighSun) {
-  const ShadowWorld world(TileShape::make(12, 11, 1), 2, 8000.0, Terrain::kRidges, 5);
-  const auto shadow = sweep(world, {LightTravel::kEastward, std::tan(89.999 * 0.017453292519943295)});
-  for_each_vertex(world, shadow, [&](std::int64_t tile, int column, int row, double found) {
-    if (is_visible(world.shape(), {column, row})) {
-      ASSERT_EQ(found, world.code(tile, column, row));
-    }
-  });
-}
-
 TEST(TileShadow, PassesOverVoidsWhichCastNothing) {
   const TileShape shape = TileShape::make(12, 5, 1);
   const TileGrid grid = TileGrid::make(shape, 1, 1, 16.0, 16.0);
@@ -146,25 +122,6 @@ std::vector<double> shadow_along_row(const std::vector<double>& elevations, cons
     shadow.push_back(std::max(elevations[i], i == 0 ? entering : shadow.back() - step[i - 1] * fall));
   }
   return shadow;
-}
-
-TEST(TileShadow, FollowsEqs17And18AlongEveryRow) {
-  const ShadowWorld world(TileShape::make(21, 39, 1), 1, 20.0, Terrain::kRidges, 11);
-  const double sigma = world.grid.sigma_x();
-  const auto shadow = sweep(world, {LightTravel::kEastward, 300.0});
-  for (int row = 1; row <= visible_rows(world.shape()); ++row) {
-    std::vector<double> heights;
-    std::vector<double> step;
-    for (int c = 1; c <= last_visible_column(world.shape(), row); ++c) {
-      heights.push_back(world.code(0, c, row));
-      if (c > 1) step.push_back((object_x(21, c, row) - object_x(21, c - 1, row)) * sigma);
-    }
-    heights = shadow_along_row(heights, step, 300.0, kNoShadow);
-    for (std::size_t i = 0; i < heights.size(); ++i) {
-      // float rounding of numbers up to 65534
-      ASSERT_NEAR(heights[i], double{shadow[0][static_cast<std::size_t>(row * 21) + i + 1]}, 0.01);
-    }
-  }
 }
 
 TEST(SunShare, RunsFromDarkToFullOverTheSunsSize) {
