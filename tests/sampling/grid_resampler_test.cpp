@@ -146,26 +146,6 @@ TEST(GridResampler, LimitedCubicStaysWithinTheSamplesAroundEachVertex) {
   }
 }
 
-TEST(GridResampler, LimitedCubicKeepsWaterFlatAtTheFootOfCliffs) {
-  std::mt19937 random(5);
-  const auto is_land = [](double x, double z) { return x + 0.7 * z + 25.0 * std::sin(0.07 * z) > 330.0; };
-  const Fixture source(42, 41, Registration::kPoint, [&](double x, double z) {
-    return is_land(x, z) ? 400.0F + static_cast<float>(random() % 300) : 12.34F;
-  });
-  std::map<Filter, std::int64_t> not_flat;
-  std::int64_t cells = 0;
-  for (const Filter filter : {Filter::kLimitedCubic, Filter::kBspline3}) {
-    for_each_vertex_inside(source, filter, [&](float height, WorldPoint, const std::vector<float>& around) {
-      if (std::any_of(around.begin(), around.end(), [](float sample) { return sample != 12.34F; })) return;
-      ++cells;
-      not_flat[filter] += height != 12.34F ? 1 : 0;
-    });
-  }
-  EXPECT_GT(cells, 500);
-  EXPECT_EQ(not_flat[Filter::kLimitedCubic], 0);
-  EXPECT_GT(not_flat[Filter::kBspline3], 20) << "no vertex has a cliff among its taps";
-}
-
 TEST(GridResampler, PlanesAreExactNextToVoidsBetweenFourSamples) {
   const auto plane = [](double x, double z) { return static_cast<float>(3.0 + 0.25 * x - 0.5 * z); };
   std::mt19937 random(9);

@@ -33,6 +33,8 @@ class MemorySource : public HeightSource {
     return samples_[static_cast<std::size_t>(row * info_.width + column)];
   }
 
+  [[nodiscard]] const std::vector<T>& samples() const { return samples_; }
+
   void read_window(const Window& window, std::span<std::byte> out) override {
     const auto row_bytes = static_cast<std::size_t>(window.columns) * sizeof(T);
     for (std::int64_t r = 0; r < window.rows; ++r) {

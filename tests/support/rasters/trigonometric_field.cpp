@@ -166,30 +166,4 @@ double evaluate(const Kernel& kernel, View2D<const float> coefficients, View2D<c
   return std::clamp(height, least, most);
 }
 
-double psnr_of_resampling(Filter filter, const TrigonometricField& field, int margin) {
-  const int n = field.n();
-  const std::vector<float> samples = field.samples();
-  std::vector<float> coefficients = samples;
-  Prefilter::make(filter, Acquisition{}).filter({coefficients.data(), n, n});
-  const Kernel kernel = Kernel::make(filter);
-  const double step = std::sqrt(2.0 / std::sqrt(3.0));
-  const double row_step = 0.5 * std::sqrt(3.0) * step;
-  double squares = 0.0;
-  std::int64_t count = 0;
-  for (int r = 0; r * row_step < n - 1 - margin; ++r) {
-    const double v = r * row_step;
-    if (v < margin) continue;
-    const double first = margin + 0.5 * step * (r & 1);
-    const int columns = static_cast<int>((n - 1 - margin - first) / step) + 1;
-    const std::vector<double> exact = field.row(v, first, step, columns);
-    for (int c = 0; c < columns; ++c) {
-      const double error =
-          evaluate(kernel, {coefficients.data(), n, n}, first + c * step, v) - exact[static_cast<std::size_t>(c)];
-      squares += error * error;
-      ++count;
-    }
-  }
-  return psnr(samples, squares, count);
-}
-
 }  // namespace isohf

@@ -37,9 +37,4 @@ class TrigonometricField {
 /// PSNR in dB of a mean squared error, squares / count, relative to the samples' peak-to-peak range.
 [[nodiscard]] double psnr(const std::vector<float>& samples, double squares, std::int64_t count);
 
-/// PSNR in dB, relative to the samples' peak-to-peak range, of ortho -> iso at equal density against the exact field:
-/// lattice column step sqrt(2 / sqrt 3), row step sqrt(3) / 2 of that, odd rows half a step to the East; only points
-/// at least `margin` samples from the square's edge count.
-[[nodiscard]] double psnr_of_resampling(Filter filter, const TrigonometricField& field, int margin);
-
 }  // namespace isohf
