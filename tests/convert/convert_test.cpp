@@ -161,38 +161,6 @@ TEST_F(Convert, WritesAnArchiveThatVerifies) {
   EXPECT_FALSE(fs::exists(path("hills.isohf.part")));
 }
 
-TEST_F(Convert, APlaneComesBackEverywhereToHalfAStep) {
-  for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
-    test::MemorySource<float> source(SampleType::kFloat32, 80, 70, [](std::int64_t c, std::int64_t r) {
-      return 5.0 + 0.5 * static_cast<double>(c) - 0.25 * static_cast<double>(r);
-    });
-    source.mutable_info().georeference.registration = registration;
-    ConvertOptions options = small_tiles();
-    options.overwrite = true;
-    options.plan.fit = true;
-    const ConvertSummary summary = run(source, path("plane.isohf"), options);
-    const ArchiveReader archive(path("plane.isohf"));
-    const TileGrid& grid = archive.grid();
-    const SourceRecord& record = archive.metadata().source;
-    std::mt19937_64 random(5);
-    std::uniform_real_distribution<double> unit(0.0, 1.0);
-    for (int i = 0; i < 3000; ++i) {
-      WorldPoint world{unit(random) * grid.world_width(), unit(random) * grid.world_height()};
-      if (i % 10 == 0) world.x = std::round(world.x / grid.extent_x()) * grid.extent_x();  // on the straight edges
-      const double u = (world.x - record.first_sample_x) / record.spacing_x;
-      const double v = (world.z - record.first_sample_z) / record.spacing_z;
-      // Half a pixel around an area source repeats the edge value: no plane there.
-      if (u < 1.0 || v < 1.0 || u > 78.0 || v > 68.0) continue;
-      const TilePoint at = grid.locate(world);
-      const std::vector<double> elevations = archive.read_elevations(at.tile);
-      const View2D<const double> view(elevations.data(), grid.shape().columns(), grid.shape().rows());
-      const double found = interpolate(barycentric(grid.shape(), at.point), view);
-      // Half a step, and single-precision rounding of heights below 64.
-      EXPECT_NEAR(found, 5.0 + 0.5 * u - 0.25 * v, summary.step / 2 + 1e-5);
-    }
-  }
-}
-
 TEST_F(Convert, APlaneGoesOnOverTheOuterHalfPixelsWhereNothingLiesBeyond) {
   for (const Outside outside : {Outside::kCover, Outside::kVoid}) {
     test::MemorySource<std::int16_t> source(SampleType::kInt16, 40, 30,
@@ -311,27 +279,6 @@ TEST_F(Convert, NothingButVoidsIsRefusedAndLeavesNothing) {
                                    [](std::int64_t, std::int64_t) { return std::numeric_limits<double>::quiet_NaN(); });
   EXPECT_THROW((void)run(source, path("nan.isohf"), small_tiles()), Error);
   EXPECT_TRUE(fs::is_empty(folder_.path()));
-}
-
-TEST_F(Convert, ACancelledJobIsResumedToTheSameBytes) {
-  auto source = hills(300, 300);
-  const ConvertOptions options = small_tiles();
-  (void)run(source, path("whole.isohf"), options);
-  std::atomic<bool> cancel = false;
-  Job job;
-  job.cancel = &cancel;
-  job.progress = [&](const Progress& at) { cancel = cancel || at.stage == "tiles"; };
-  try {
-    (void)convert(source, path("parts.isohf"), options, job);
-    FAIL() << "was not cancelled";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kCancelled);
-  }
-  EXPECT_FALSE(fs::exists(path("parts.isohf")));
-  ConvertOptions again = options;
-  again.resume = true;
-  (void)run(source, path("parts.isohf"), again);
-  EXPECT_TRUE(test::read_file(path("parts.isohf")) == test::read_file(path("whole.isohf")));
 }
 
 TEST_F(Convert, RadiiOfAWholeMoonKeepTheirDecimals) {
