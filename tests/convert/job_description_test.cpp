@@ -6,6 +6,9 @@
 #include <functional>
 #include <set>
 #include <string>
+#include <vector>
+
+#include "support/rasters/memory_photo.h"
 
 namespace isohf::test {
 namespace {
@@ -45,13 +48,19 @@ TEST(JobFingerprint, TellsTreatmentsOfVoidsApart) {
   }
 }
 
-TEST(JobFingerprint, TellsEffortsApart) {
+TEST(JobFingerprint, TellsEffortsSeedsAndTexturesApart) {
   const SourceInfo info = source_info();
+  MemoryPhoto photo(3, 2, 3, [](auto, auto, int) { return 0; });
+  std::vector<ConvertOptions> all(7);
+  all[1].effort = Effort::kFast;
+  all[2].effort = Effort::kBest;
+  all[3].shadow_seeds = ShadowSeedRequest{2.0};
+  all[4].shadow_seeds = ShadowSeedRequest{3.0};
+  all[5].texture = TextureRequest{&photo, {}, 64};
+  all[6].texture = TextureRequest{&photo, {}, 128};
   std::set<std::string> found;
-  for (const Effort effort : {Effort::kFast, Effort::kDefault, Effort::kBest}) {
-    ConvertOptions options;
-    options.effort = effort;
-    EXPECT_TRUE(found.insert(job_fingerprint(info, make_plan(info, options.plan), options)).second) << level_of(effort);
+  for (const ConvertOptions& options : all) {
+    EXPECT_TRUE(found.insert(job_fingerprint(info, make_plan(info, options.plan), options)).second) << found.size();
   }
 }
 

@@ -16,7 +16,6 @@
 #include "isohf/shade.h"
 #include "isohf/surface.h"
 #include "isohf/verify.h"
-#include "lattice/vertex_below.h"
 #include "support/altered_archive.h"
 #include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
@@ -53,36 +52,17 @@ std::set<int> findings_in(const std::string& archive) {
   return ids;
 }
 
-TEST(PlaneStage, PlanesOfEveryCodeTypeHoldWhatTheTilesBelowHold) {
+TEST(PlaneStage, PlanesOfEveryCodeTypePassVerify) {
   const test::TemporaryFolder folder;
   for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
     Hills source;
     const ConvertSummary summary = convert(source, folder / "a.isohf", options_of(type));
     EXPECT_GT(summary.plane_bytes, 0U);
     EXPECT_EQ(summary.metadata.planes, (PlaneInfo{8, 2}));
-    const ArchiveReader archive(folder / "a.isohf");
-    const Planes planes = planes_of(archive.metadata());
-    const TileShape& shape = archive.grid().shape();
-    std::int64_t same = 0;
+    const Planes planes = planes_of(summary.metadata);
     for (int plane = 1; plane <= planes.count(); ++plane) {
-      EXPECT_EQ(archive.metadata().plane_grid(plane), planes.grid(plane));
-      for (std::int64_t i = 0; i < planes.grid(plane).tile_count(); ++i) {
-        const TileIndex tile = planes.grid(plane).tile_at(i);
-        const std::vector<double> heights = archive.read_elevations(tile, plane);
-        for (int r = 1; r < shape.rows() - 1; r += 3) {
-          for (int c = 1; c < shape.columns() - 3; ++c) {
-            if (planes.is_beyond(plane, planes.grid(plane).lattice_vertex(tile, {c, r}))) continue;
-            const test::TileVertex below = test::vertex_below(planes, plane, tile, {c, r});
-            const double wanted = archive.read_elevations(
-                below.tile)[static_cast<std::size_t>(below.vertex.row * shape.columns() + below.vertex.column)];
-            const double found = heights[static_cast<std::size_t>(r * shape.columns() + c)];
-            ASSERT_TRUE(found == wanted || (std::isnan(found) && std::isnan(wanted)));
-            same += std::isnan(found) ? 0 : 1;
-          }
-        }
-      }
+      EXPECT_EQ(summary.metadata.plane_grid(plane), planes.grid(plane));
     }
-    EXPECT_GT(same, 100);
     EXPECT_EQ(findings_in(folder / "a.isohf"), std::set<int>());
   }
 }
@@ -91,17 +71,12 @@ TEST(PlaneStage, VerifyFindsWhatIsNotThatOfTheTilesBelow) {
   const test::TemporaryFolder folder;
   Hills source;
   (void)convert(source, folder / "a.isohf", options_of());
-  {
+  for (const bool is_there : {true, false}) {
     test::AlteredArchive altered(folder / "a.isohf");
-    altered.set("planes/1/0/1.tile", altered.bytes("planes/1/0/2.tile"));
+    if (is_there) altered.set("planes/1/0/1.tile", altered.bytes("planes/1/0/2.tile"));
+    if (!is_there) altered.remove("planes/2/0/0.tile");
     altered.write(folder / "b.isohf");
-    EXPECT_TRUE(findings_in(folder / "b.isohf").count(finding::kPlane));
-  }
-  {
-    test::AlteredArchive altered(folder / "a.isohf");
-    altered.remove("planes/2/0/0.tile");
-    altered.write(folder / "b.isohf");
-    EXPECT_TRUE(findings_in(folder / "b.isohf").count(finding::kPlane));
+    EXPECT_TRUE(findings_in(folder / "b.isohf").count(finding::kPlane)) << is_there;
   }
 }
 

@@ -173,17 +173,6 @@ TEST(SeedStage, AResumeFromAnyTileGivesTheSameBytes) {
   }
 }
 
-TEST(SeedStage, AnotherRequestIsAnotherJob) {
-  const test::TemporaryFolder folder;
-  Ridges source;
-  source.fail_from_row = 59;
-  EXPECT_THROW((void)run(source, folder / "a.isohf", options_with({2.0})), Error);
-  source.fail_from_row = std::numeric_limits<std::int64_t>::max();
-  ConvertOptions options = options_with({3.0});
-  options.resume = true;
-  EXPECT_THROW((void)run(source, folder / "a.isohf", options), Error);
-}
-
 TEST(SeedStage, RefusesSunsThatAreNone) {
   const test::TemporaryFolder folder;
   Ridges source(40, 40);

@@ -281,22 +281,6 @@ TEST(TextureStage, ShowsNothingBeyondAPhotoOfAPartOfTheGround) {
   }
 }
 
-TEST(TextureStage, GivesTheSameBytesForAnyNumberOfThreads) {
-  const test::TemporaryFolder folder;
-  Hills source;
-  MemoryPhoto photo(700, 500, 3, noise);
-  std::string first;
-  for (const int threads : {1, 2, 5}) {
-    ConvertOptions options = options_for(photo, TextureFormat::kJpeg);
-    options.shadow_seeds.emplace();
-    options.lossless = true;
-    (void)run(source, folder / "a.isohf", options, {.threads = threads});
-    const std::string bytes = read_file(folder / "a.isohf");
-    if (first.empty()) first = bytes;
-    EXPECT_EQ(bytes, first);
-  }
-}
-
 /// Breaks off where a tile's row of pixels is asked for.
 class FailingPhoto final : public PhotoSource {
  public:

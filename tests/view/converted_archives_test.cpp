@@ -72,19 +72,6 @@ TEST_F(TexturedArchiveTest, ShowsTexturesUnlessAskedForOtherColours) {
   EXPECT_NE(refused.err.find("convert with --texture"), std::string::npos);
 }
 
-TEST_F(TexturedArchiveTest, NamesABrokenTextureInOneLine) {
-  convert({"--texture", folder_ / "photo.ppm"});
-  std::string bytes = read_file(archive());
-  const std::size_t at = bytes.find("textures/0/0/8.jpg");
-  ASSERT_NE(at, std::string::npos);
-  bytes[at + 60] ^= 0x55;
-  write_file(archive(), bytes);
-  const RunResult result = view({"--screenshot", folder_ / "b.png"});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  EXPECT_NE(result.err.find("textures/0/0/8.jpg"), std::string::npos) << result.err;
-}
-
 TEST_F(ConvertedArchiveTest, ShadowsNeedNoSeeds) {
   convert({"--shadow-seeds"});
   const std::string seeded = picture({"--sun", "200,6"});
