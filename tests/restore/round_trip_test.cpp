@@ -2,7 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include "support/rasters/restored_field.h"
+#include "isohf/archive.h"
+#include "isohf/convert.h"
+#include "isohf/surface.h"
+#include "support/rasters/memory_source.h"
+#include "support/rasters/trigonometric_field.h"
+#include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
@@ -10,10 +15,45 @@ namespace {
 constexpr int kSize = 128;
 constexpr int kMargin = 24;  // 0.43^24, the quintic's slower pole, hides the mirrored edge below 1e-8
 
+/// PSNR in dB, relative to the samples' peak-to-peak range, of the field's samples after isohf's own conversion to an
+/// archive and restoring from it: floats, 5 x 6 small tiles, column step 1 and row step 26/30 = 0.8667 (sqrt(3)/2 =
+/// 0.8660), 15.4 % more vertices than samples. Only samples at least `margin` from the square's edge count.
+double psnr_of_restoring(Filter filter, const TrigonometricField& field, int margin, RestoreMethod method) {
+  const int n = field.n();
+  const std::vector<float> samples = field.samples();
+  const auto sample_at = [&](std::int64_t c, std::int64_t r) { return samples[static_cast<std::size_t>(r * n + c)]; };
+  test::MemorySource<float> source(
+      SampleType::kFloat32, n, n, [&](std::int64_t c, std::int64_t r) { return static_cast<double>(sample_at(c, r)); });
+  ConvertOptions options;
+  options.filter = filter;
+  options.code_type = CodeType::kF32;
+  options.plan.shape = {30, 33};
+  options.plan.levels = 1;
+  options.plan.spacing = 1.0;
+  options.plan.outside = Outside::kCover;
+  const test::TemporaryFolder folder;
+  (void)convert(source, folder / "field.isohf", options);
+
+  const ArchiveReader archive(folder / "field.isohf");
+  RowReader surface(archive, source_grid(archive.metadata().source), method);
+  std::vector<double> restored(samples.size());
+  surface.read(0, n, restored);
+  double squares = 0.0;
+  std::int64_t count = 0;
+  for (int r = margin; r < n - margin; ++r) {
+    for (int c = margin; c < n - margin; ++c) {
+      const double error = restored[static_cast<std::size_t>(r * n + c)] - static_cast<double>(sample_at(c, r));
+      squares += error * error;
+      ++count;
+    }
+  }
+  return psnr(samples, squares, count);
+}
+
 double mean_psnr(Filter filter, double rho, RestoreMethod method) {
   double sum = 0.0;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    sum += test::psnr_of_restoring(filter, TrigonometricField(kSize, 1.8, rho, seed), kMargin, method);
+    sum += psnr_of_restoring(filter, TrigonometricField(kSize, 1.8, rho, seed), kMargin, method);
   }
   return sum / 4.0;
 }

@@ -4,12 +4,13 @@
 
 #include <cmath>
 #include <map>
+#include <memory>
 #include <random>
 
 #include "camera.h"
 #include "gl/offscreen.h"
 #include "gl_test.h"
-#include "memory_planes.h"
+#include "memory_tiles.h"
 #include "session.h"
 
 namespace isohf::view {
@@ -86,13 +87,70 @@ TEST(PlaneChoice, WithoutPlanesDrawsTheTilesOfTheRange) {
   EXPECT_EQ(choose_tiles(planes, {2, 5, 7, 8}, wishes).size(), 6U);
 }
 
+/// The analytic surface with coarse planes, decimated vertex by vertex.
+class MemoryPlanes final : public TileSource {
+ public:
+  explicit MemoryPlanes(const TileGrid& grid)
+      : tiles_(grid), planes_(grid, plane_stride(grid.shape()), plane_count(grid, plane_stride(grid.shape())), false) {
+    for (int plane = 1; plane <= planes_.count(); ++plane) coarse_.push_back(std::make_unique<Coarse>(*this, plane));
+  }
+  [[nodiscard]] const TileGrid& grid() const override { return tiles_.grid(); }
+  [[nodiscard]] ViewScale scale() const override { return tiles_.scale(); }
+  [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return tiles_.bounds(tile); }
+  void read(TileIndex tile, std::span<std::uint16_t> codes) const override { tiles_.read(tile, codes); }
+  [[nodiscard]] const Planes* planes() const override { return &planes_; }
+  [[nodiscard]] const TileSource& plane(int plane) const override {
+    if (plane == 0) return *this;
+    return *coarse_[static_cast<std::size_t>(plane) - 1];
+  }
+
+ private:
+  class Coarse final : public TileSource {
+   public:
+    Coarse(const MemoryPlanes& whole, int plane) : whole_(whole), plane_(plane) {}
+    [[nodiscard]] const TileGrid& grid() const override { return whole_.planes_.grid(plane_); }
+    [[nodiscard]] ViewScale scale() const override { return whole_.scale(); }
+    [[nodiscard]] WorldBounds covered() const override { return whole_.covered(); }
+    [[nodiscard]] TileBounds bounds(TileIndex tile) const override {
+      const isohf::TileRange range = whole_.planes_.below(plane_, tile);
+      TileBounds all{false, false, 1e9, -1e9};
+      for (std::int64_t row = range.first.row; row < range.end.row; ++row) {
+        for (std::int64_t column = range.first.column; column < range.end.column; ++column) {
+          const TileBounds one = whole_.plane(plane_ - 1).bounds({column, row});
+          all = {true, false, std::min(all.low, one.low), std::max(all.high, one.high)};
+        }
+      }
+      return all;
+    }
+    void read(TileIndex tile, std::span<std::uint16_t> codes) const override {
+      const TileGrid& own = grid();
+      std::size_t i = 0;
+      for (int row = 0; row < own.shape().rows(); ++row) {
+        for (int column = 0; column < own.shape().columns(); ++column) {
+          const LatticeVertex at = own.lattice_vertex(tile, {column, row});
+          codes[i++] =
+              whole_.planes_.is_beyond(plane_, at) ? kVoidCode : test::analytic_code(whole_.planes_.place(plane_, at));
+        }
+      }
+    }
+
+   private:
+    const MemoryPlanes& whole_;
+    int plane_;
+  };
+
+  test::MemoryTiles tiles_;
+  Planes planes_;
+  std::vector<std::unique_ptr<Coarse>> coarse_;
+};
+
 class PlanePictureTest : public test::GlTest {};
 
 /// With planes a picture has the same ground as without them: no hole where tiles of two planes meet.
 TEST_F(PlanePictureTest, HasNoHolesAndNoMoreTrianglesThanItNeeds) {
   const TileGrid grid = TileGrid::make(TileShape::make(28, 27, 3), 24, 20, 600.0, 600.0);
   const test::MemoryTiles plain(grid);
-  const test::MemoryPlanes planes(grid);
+  const MemoryPlanes planes(grid);
   ASSERT_EQ(planes.planes()->count(), 3);
   for (const auto& [eye, target] : {std::pair{Vec3{2000.0, 900.0, 11000.0}, Vec3{9000.0, 0.0, 2000.0}},
                                     std::pair{Vec3{7000.0, 400.0, 6000.0}, Vec3{12000.0, 100.0, 1000.0}},
@@ -144,7 +202,7 @@ TEST_F(PlanePictureTest, HasNoHolesAndNoMoreTrianglesThanItNeeds) {
 
 /// What lies before a short far distance is drawn as finely as without one.
 TEST_F(PlanePictureTest, IsAsFineNearTheEyeWhereLessIsSeen) {
-  const test::MemoryPlanes planes(TileGrid::make(TileShape::make(28, 27, 3), 24, 20, 600.0, 600.0));
+  const MemoryPlanes planes(TileGrid::make(TileShape::make(28, 27, 3), 24, 20, 600.0, 600.0));
   const auto finest = [&](std::optional<double> far_distance) {
     Options options;
     options.view.width = 480;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "isohf/lattice/barycentric.h"
+#include "ground.h"
 #include "isohf/lattice/shadow_path.h"
 #include "memory_tiles.h"
 #include "session.h"
@@ -42,45 +42,28 @@ std::vector<TileShadow> cast(const TileSource& source, const CastingSun& sun, co
   return cast_shadows(source, sun, tiles, {}, leaves, unread != nullptr ? *unread : nobody);
 }
 
-class Field {
- public:
-  explicit Field(const MemoryTiles& source) : source_(source) {
-    for (std::int64_t tile = 0; tile < source.grid().tile_count(); ++tile) {
-      tiles_.emplace_back(static_cast<std::size_t>(source.grid().shape().stored_vertex_count()));
-      source.read_heights(source.grid().tile_at(tile), tiles_.back());
-    }
-  }
-  /// World units; NaN beyond.
-  [[nodiscard]] double at(double x, double z) const {
-    const TileGrid& over = source_.grid();
-    if (x < 0.0 || z < 0.0 || x > over.world_width() || z > over.world_height()) return std::nan("");
-    const auto place = over.locate({x, z});
-    const View2D<const float> values(tiles_[static_cast<std::size_t>(over.flat_index(place.tile))].data(),
-                                     over.shape().columns(), over.shape().rows());
-    return interpolate(barycentric(over.shape(), place.point), values) * source_.scale().scale;
-  }
-  /// Whether a ray from there meets the ground.
-  [[nodiscard]] bool is_dark(double x, double z, const CastingSun& sun) const {
-    const double height = at(x, z);
-    const double step = 0.2 * source_.grid().sigma_x();
-    for (int n = 1;; ++n) {
-      const double way = n * step;
-      const double there =
-          at(x + way * std::sin(sun.azimuth_deg * kDegree), z - way * std::cos(sun.azimuth_deg * kDegree));
-      if (std::isnan(there)) return false;
-      if (there > height + way * std::tan(sun.elevation_deg * kDegree) + 1e-6) return true;
-    }
-  }
+/// Height at a place, world units; NaN beyond.
+double height_at(Ground& ground, double x, double z) {
+  return ground.height({x, z}).value_or(std::nan(""));
+}
 
- private:
-  const MemoryTiles& source_;
-  std::vector<std::vector<float>> tiles_;
-};
+/// Whether a ray from there meets the ground.
+bool is_dark(Ground& ground, double x, double z, const CastingSun& sun) {
+  const double height = height_at(ground, x, z);
+  const double step = 0.2 * grid().sigma_x();
+  for (int n = 1;; ++n) {
+    const double way = n * step;
+    const double there =
+        height_at(ground, x + way * std::sin(sun.azimuth_deg * kDegree), z - way * std::cos(sun.azimuth_deg * kDegree));
+    if (std::isnan(there)) return false;
+    if (there > height + way * std::tan(sun.elevation_deg * kDegree) + 1e-6) return true;
+  }
+}
 
 // Vertices of all tiles, lit and dark as a ray from each says, but for those within a cell of a border.
 TEST(CastShadows, AgreeWithRaysForSunsThatStandAnywhere) {
   const MemoryTiles source(grid(), [](TileIndex tile, auto& codes) { raise_ridges(grid(), tile, codes); });
-  const Field field(source);
+  Ground ground(source);
   const TileShape& shape = source.grid().shape();
   std::vector<TileIndex> all;
   for (std::int64_t tile = 0; tile < source.grid().tile_count(); ++tile) all.push_back(source.grid().tile_at(tile));
@@ -94,12 +77,12 @@ TEST(CastShadows, AgreeWithRaysForSunsThatStandAnywhere) {
         for (int c = 2; c < last_visible_column(shape, r); c += 3) {
           const WorldPoint at = source.grid().world_from_object(
               shadow.tile, {static_cast<double>(object_x(shape.columns(), c, r)), r - 1.0});
-          const bool want = field.is_dark(at.x, at.z, sun);
+          const bool want = is_dark(ground, at.x, at.z, sun);
           const double cell = 2.0 * source.grid().sigma_x();
           bool on_border = false;
           for (const auto& [dx, dz] : {std::pair{cell, 0.0}, {-cell, 0.0}, {0.0, cell}, {0.0, -cell}}) {
-            if (!std::isnan(field.at(at.x + dx, at.z + dz))) {
-              on_border = on_border || field.is_dark(at.x + dx, at.z + dz, sun) != want;
+            if (!std::isnan(height_at(ground, at.x + dx, at.z + dz))) {
+              on_border = on_border || is_dark(ground, at.x + dx, at.z + dz, sun) != want;
             }
           }
           if (on_border) continue;
