@@ -7,6 +7,7 @@
 #include <random>
 
 #include "isohf/error.h"
+#include "support/error_of.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -44,13 +45,9 @@ TEST(KeptRows, HoldsWhatWasWrittenInMemoryAndInAFile) {
 
 TEST(KeptRows, AFolderThatIsNoneIsNamed) {
   KeptRows<float> rows(4, ScratchFolder("/nonexistent"));
-  try {
-    rows.add(0);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kIo);
-    EXPECT_NE(std::string(error.what()).find("/nonexistent"), std::string::npos);
-  }
+  const Error error = test::error_of([&] { rows.add(0); });
+  EXPECT_EQ(error.code(), ErrorCode::kIo);
+  EXPECT_NE(std::string(error.what()).find("/nonexistent"), std::string::npos);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include <filesystem>
 
 #include "isohf/error.h"
+#include "support/error_of.h"
 #include "support/temporary_folder.h"
 
 namespace {
@@ -54,22 +55,12 @@ extern "C" int fsync(int file) {
 namespace isohf {
 namespace {
 
+using test::error_of;
 using test::read_file;
 using test::TemporaryFolder;
 using test::write_file;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-template <typename Action>
-Error error_of(Action action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error;
-  }
-  ADD_FAILURE() << "nothing was thrown";
-  return {ErrorCode::kCancelled, ""};
-}
 
 void write(const std::string& path, std::string_view text, bool overwrite) {
   OutputFile file(path, {overwrite});

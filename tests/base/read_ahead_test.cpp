@@ -9,6 +9,7 @@
 
 #include "isohf/byte_source.h"
 #include "isohf/error.h"
+#include "support/error_of.h"
 
 namespace isohf {
 namespace {
@@ -20,13 +21,9 @@ TEST(ReadAhead, MakesNoRoomForWhatTheSourceCannotHold) {
   ReadAhead ahead;
   for (const std::uint64_t size : {std::uint64_t{991}, std::uint64_t{0xffffffff}, std::uint64_t{1} << 62U,
                                    std::numeric_limits<std::uint64_t>::max()}) {
-    try {
-      (void)ahead.bytes(*source, 10, size);
-      ADD_FAILURE() << size;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::kIo);
-      EXPECT_THAT(error.what(), testing::HasSubstr("ends at byte 1000"));
-    }
+    const Error error = test::error_of([&] { (void)ahead.bytes(*source, 10, size); });
+    EXPECT_EQ(error.code(), ErrorCode::kIo) << size;
+    EXPECT_THAT(error.what(), testing::HasSubstr("ends at byte 1000"));
   }
   EXPECT_EQ(ahead.bytes(*source, 400, 600).front(), std::byte{7});
   // Nor is anything there already of which only sums, taken modulo 2^64, lie within what was read.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "isohf/error.h"
+#include "support/error_of.h"
 
 namespace isohf {
 namespace {
@@ -56,13 +57,11 @@ TEST(Quantiser, ConstantElevationsNeedNoRange) {
 }
 
 TEST(Quantiser, AStepTooFineForTheTypeIsRefusedWithOneThatFits) {
-  try {
+  const Error error = test::error_of([] {
     (void)choose_quantisation({CodeType::kU8, 0.5}, {0.0, 1000.0}, info_of(SampleType::kInt16));
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-    EXPECT_NE(std::string(error.what()).find("3.93"), std::string::npos) << error.what();
-  }
+  });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+  EXPECT_NE(std::string(error.what()).find("3.93"), std::string::npos) << error.what();
   EXPECT_THROW((void)choose_quantisation({CodeType::kU16, -1.0}, {0.0, 1.0}, info_of(SampleType::kInt16)), Error);
 }
 

@@ -14,6 +14,7 @@
 #include "isohf/parts.h"
 #include "isohf/shards.h"
 #include "isohf/verify.h"
+#include "support/error_of.h"
 #include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
@@ -116,13 +117,9 @@ TEST_F(CodeSourceTest, TheBytesAreThoseOfAnyThreadsMemoryAndShards) {
 }
 
 TEST_F(CodeSourceTest, AStepThatRoundsByMoreThanTheBoundIsRefused) {
-  try {
-    run("a.isohf", options_of(2.1 * kMost));
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-    EXPECT_THAT(error.what(), HasSubstr("step 5.25 rounds by up to 2.6"));
-  }
+  const Error error = test::error_of([&] { run("a.isohf", options_of(2.1 * kMost)); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+  EXPECT_THAT(error.what(), HasSubstr("step 5.25 rounds by up to 2.6"));
   EXPECT_THROW(run("a.isohf", options_of(0.0)), Error);
 }
 

@@ -7,6 +7,7 @@
 
 #include "isohf/convert.h"
 #include "isohf/error.h"
+#include "support/error_of.h"
 #include "support/rasters/memory_source.h"
 #include "support/sanitizers.h"
 #include "support/temporary_folder.h"
@@ -151,13 +152,9 @@ TEST(MemoryPlan, ALimitThatIsTooSmallIsAnsweredWithTheSmallest) {
   const test::TemporaryFolder folder;
   test::MemorySource<std::int16_t> source(SampleType::kInt16, 90, 75,
                                           [](auto c, auto) { return static_cast<double>(c); });
-  try {
-    (void)convert(source, folder / "a.isohf", {}, {.memory_bytes = 1000000});
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kOutOfMemory);
-    EXPECT_THAT(error.what(), HasSubstr("`memory_bytes` allows 1 MB, this conversion needs at least "));
-  }
+  const Error error = test::error_of([&] { (void)convert(source, folder / "a.isohf", {}, {.memory_bytes = 1000000}); });
+  EXPECT_EQ(error.code(), ErrorCode::kOutOfMemory);
+  EXPECT_THAT(error.what(), HasSubstr("`memory_bytes` allows 1 MB, this conversion needs at least "));
   EXPECT_TRUE(folder.names().empty());
 }
 

@@ -13,6 +13,7 @@
 #include "isohf/projection/projection.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/verify.h"
+#include "support/error_of.h"
 #include "support/rasters/memory_source.h"
 #include "support/rasters/place_at.h"
 #include "support/temporary_folder.h"
@@ -223,17 +224,11 @@ TEST(JoinedGlobe, TilesAcrossTheJoinShareTheirVertices) {
 TEST(JoinedGlobe, AnInputThatDoesNotGoRoundIsRefused) {
   const test::TemporaryFolder folder;
   const auto owner = source_over(kGrounds[0], 200, 220);
-  Source& source = *owner;
   ConvertOptions options = options_for("auto");
   options.plan.ground.wrap_x = true;
-  try {
-    (void)run(source, folder / "a.isohf", options);
-    ADD_FAILURE() << "was taken";
-  } catch (const Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "memory: `wrap_x` needs columns all the way round, 360 degrees; this input's 200 columns 0.04 apart "
-                 "make 8");
-  }
+  EXPECT_STREQ(test::error_of([&] { (void)run(*owner, folder / "a.isohf", options); }).what(),
+               "memory: `wrap_x` needs columns all the way round, 360 degrees; this input's 200 columns 0.04 apart "
+               "make 8");
 }
 
 }  // namespace

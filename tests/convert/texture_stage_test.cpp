@@ -13,6 +13,7 @@
 #include "isohf/convert/frame/photo_placement.h"
 #include "isohf/error.h"
 #include "isohf/verify.h"
+#include "support/error_of.h"
 #include "support/rasters/memory_photo.h"
 #include "support/rasters/memory_source.h"
 #include "support/rasters/place_at.h"
@@ -53,13 +54,9 @@ ConvertSummary run(HeightSource& source, const std::string& output, const Conver
 }
 
 std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-    return error.what();
-  }
-  return "nothing was thrown";
+  const Error error = test::error_of(action);
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+  return error.what();
 }
 
 /// 30 m pixels from (500000, 4000000) on.

@@ -12,6 +12,7 @@
 #include <random>
 
 #include "isohf/error.h"
+#include "support/error_of.h"
 #include "support/rasters/memory_source.h"
 
 namespace isohf::test {
@@ -307,12 +308,7 @@ TEST(FilledSource, RefusesAnEmptyRange) {
   VoidTreatment empty;
   empty.valid_range = {5.0, 5.0};
   auto source = std::make_unique<MemorySource<float>>(SampleType::kFloat32, 4, 4, [](auto, auto) { return 0.0; });
-  try {
-    (void)with_voids_treated(std::move(source), empty);
-    ADD_FAILURE() << "taken";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-  }
+  EXPECT_EQ(error_of([&] { (void)with_voids_treated(std::move(source), empty); }).code(), ErrorCode::kInvalidArgument);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "isohf/error.h"
+#include "support/error_of.h"
 #include "support/rasters/memory_source.h"
 #include "support/rasters/place_at.h"
 #include "support/rasters/small_geoid.h"
@@ -35,13 +36,7 @@ std::unique_ptr<MemorySource<T>> globe(SampleType type) {
 }
 
 std::string refusal_of(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  ADD_FAILURE() << "nothing was refused";
-  return {};
+  return test::error_of(work).what();
 }
 
 TEST(GeoidRequest, ReadsFileAndWay) {

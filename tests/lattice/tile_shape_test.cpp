@@ -10,6 +10,7 @@
 
 #include "isohf/error.h"
 #include "lattice/mesh_check.h"
+#include "support/error_of.h"
 
 namespace isohf {
 namespace {
@@ -50,14 +51,10 @@ TEST(TileShape, ErrorsNameTheBrokenConstraintAndTheNearestShape) {
       {5, 5, 15, "levels is 15, must lie in 1..14", "8196x16387 with 14 levels"},
   };
   for (const auto& c : cases) {
-    try {
-      (void)TileShape::make(c.columns, c.rows, c.levels);
-      ADD_FAILURE() << c.columns << "x" << c.rows << " accepted";
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-      EXPECT_THAT(error.what(), HasSubstr(c.constraint));
-      EXPECT_THAT(error.what(), HasSubstr(c.remedy));
-    }
+    const Error error = test::error_of([&] { (void)TileShape::make(c.columns, c.rows, c.levels); });
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument) << c.columns << "x" << c.rows;
+    EXPECT_THAT(error.what(), HasSubstr(c.constraint));
+    EXPECT_THAT(error.what(), HasSubstr(c.remedy));
   }
 }
 

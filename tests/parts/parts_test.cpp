@@ -15,6 +15,7 @@
 #include "isohf/shards.h"
 #include "isohf/surface.h"
 #include "isohf/verify.h"
+#include "support/error_of.h"
 #include "support/rasters/memory_photo.h"
 #include "support/rasters/memory_source.h"
 #include "support/rasters/place_at.h"
@@ -55,14 +56,7 @@ class Parts : public testing::Test {
     (void)convert(source, folder / name, options);
     return folder / name;
   }
-  std::string refusal(const std::function<void()>& action) {
-    try {
-      action();
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "nothing was refused";
-  }
+  std::string refusal(const std::function<void()>& action) { return test::error_of(action).what(); }
 
   test::TemporaryFolder folder;
   ConvertOptions options;

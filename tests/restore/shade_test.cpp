@@ -11,6 +11,7 @@
 #include "isohf/convert.h"
 #include "isohf/error.h"
 #include "isohf/light/light.h"
+#include "support/error_of.h"
 #include "support/rasters/memory_source.h"
 #include "support/temporary_folder.h"
 
@@ -130,12 +131,7 @@ TEST_F(ShadeTest, PixelsDoNotDependOnThreadsOrOnWhetherRowsAreTaken) {
 TEST_F(ShadeTest, RefusesWhatIsOutOfRangeAndStopsWhereCancelled) {
   const ArchiveReader archive(folder / "a.isohf");
   const auto code_of = [&](const ShadeOptions& options, const Job& job = {}) {
-    try {
-      (void)shade(archive, options, job);
-    } catch (const Error& error) {
-      return error.code();
-    }
-    return ErrorCode::kWarning;  // none
+    return test::error_of([&] { (void)shade(archive, options, job); }).code();
   };
   const auto with = [](auto change) {
     ShadeOptions options;
@@ -168,20 +164,12 @@ TEST(ShadeCancel, StopsAmongThePixelsOfOneTile) {
   std::atomic<bool> cancel = false;
   Job job;
   job.cancel = &cancel;
-  ErrorCode code = ErrorCode::kWarning;  // none
   int taken = 0;
-  try {
-    (void)shade_rows(
-        archive, options,
-        [&](std::span<const std::byte>) {
-          ++taken;
-          cancel = true;
-        },
-        job);
-  } catch (const Error& error) {
-    code = error.code();
-  }
-  EXPECT_EQ(code, ErrorCode::kCancelled);
+  const auto take = [&](std::span<const std::byte>) {
+    ++taken;
+    cancel = true;
+  };
+  EXPECT_EQ(test::error_of([&] { (void)shade_rows(archive, options, take, job); }).code(), ErrorCode::kCancelled);
   EXPECT_EQ(taken, 1);
 }
 

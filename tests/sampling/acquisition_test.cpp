@@ -4,23 +4,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 
 #include "isohf/error.h"
+#include "support/error_of.h"
 
 namespace isohf {
 namespace {
 
 using testing::HasSubstr;
 
-std::string refusal(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-    return error.what();
-  }
-  return "nothing thrown";
+std::string refusal(const std::string& text) {
+  const Error error = test::error_of([&] { (void)acquisition_from_string(text); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+  return error.what();
 }
 
 /// The B-spline of degree n by one-sided powers: 1/n! sum of (-1)^i (n+1 over i) (x + (n+1)/2 - i)^n, bases >= 0.
@@ -71,8 +67,7 @@ TEST(Acquisition, OtherTextsAreRefused) {
                            "1,2,1,",
                            "1,nan,1",
                            "1,1e999,1"}) {
-    EXPECT_THAT(refusal([&] { (void)acquisition_from_string(text); }),
-                HasSubstr(std::string("\"").append(text).append("\"")));
+    EXPECT_THAT(refusal(text), HasSubstr(std::string("\"").append(text).append("\"")));
   }
 }
 
@@ -84,17 +79,16 @@ TEST(Acquisition, TapsAreDividedByTheirSumWhereTheyAreUsed) {
 }
 
 TEST(Acquisition, TapsThatAreNoFilterAreRefusedWithWhatOneIs) {
-  const auto message = [](const std::string& text) { return refusal([&] { (void)acquisition_from_string(text); }); };
   for (const auto& [text, why] : {std::pair{"1,1", "there are 2"},
                                   {"1,2,1.01", "taps 1 and 3 are 1 and 1.01"},
                                   {"1,-2,1", "they sum to 0"},
                                   {"0", "they sum to 0"}}) {
-    EXPECT_THAT(message(text), HasSubstr(why)) << text;
-    EXPECT_THAT(message(text), HasSubstr("Give an odd number of taps, the same from both ends")) << text;
+    EXPECT_THAT(refusal(text), HasSubstr(why)) << text;
+    EXPECT_THAT(refusal(text), HasSubstr("Give an odd number of taps, the same from both ends")) << text;
   }
   std::string many = "1";
   for (int i = 1; i < 257; ++i) many += ",1";
-  EXPECT_THAT(message(many), HasSubstr("more than 255"));
+  EXPECT_THAT(refusal(many), HasSubstr("more than 255"));
 }
 
 TEST(SampledResponse, OfPointsIsTheKernelAtIntegers) {

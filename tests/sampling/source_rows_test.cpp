@@ -10,6 +10,7 @@
 #include <set>
 
 #include "isohf/error.h"
+#include "support/error_of.h"
 
 namespace isohf {
 namespace {
@@ -132,14 +133,9 @@ TEST(SourceRows, ARunThatBeginsInTheMiddleReadsNothingBefore) {
 TEST(SourceRows, AFolderThatIsNotThereIsNamed) {
   BlockSource source(70, 100, 70, 8);
   const std::string folder = testing::TempDir() + "/isohf-no-such-folder";
-  try {
-    const SourceRows rows(source, ReadStep::make(source.info(), 2000), folder, 60);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kIo);
-    EXPECT_NE(std::string(error.what()).find(folder + ": cannot make a scratch file"), std::string::npos)
-        << error.what();
-  }
+  const Error error = test::error_of([&] { SourceRows(source, ReadStep::make(source.info(), 2000), folder, 60); });
+  EXPECT_EQ(error.code(), ErrorCode::kIo);
+  EXPECT_NE(std::string(error.what()).find(folder + ": cannot make a scratch file"), std::string::npos) << error.what();
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "memory_tiles.h"
 #include "paging/texture_overview.h"
 #include "session.h"
+#include "support/error_of.h"
 #include "support/rasters/memory_photo.h"
 
 namespace isohf::view {
@@ -281,13 +282,9 @@ TEST_F(TextureBoxTest, NamesATextureThatCannotBeRead) {
   TexturedPlain source(photo, 64, 4);
   source.broken = {1, 0};
   Session session(source, looking_down_options(64, 64));
-  try {
-    session.complete_frame();
-    FAIL() << "did not throw";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
-    EXPECT_THAT(error.what(), testing::HasSubstr("textures/0/1/64.png"));
-  }
+  const Error error = test::error_of([&] { session.complete_frame(); });
+  EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+  EXPECT_THAT(error.what(), testing::HasSubstr("textures/0/1/64.png"));
   EXPECT_EQ(session.textures()->figures().resident, 5);
 }
 
