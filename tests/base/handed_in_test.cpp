@@ -106,17 +106,11 @@ TEST_F(HandedIn, AcquisitionsAreHeldToTheirRules) {
                 }),
                 HasSubstr("sigma must be a number above 0 and at most 100 source samples"));
   }
-  const auto by_taps = [&](const std::vector<double>& taps) {
-    return converting([&](auto& options, auto&) {
-      options.acquisition.kind = Acquisition::Kind::kTaps;
-      options.acquisition.taps = taps;
-    });
-  };
-  EXPECT_THAT(by_taps({.5, .5}), HasSubstr("there are 2"));
-  EXPECT_THAT(by_taps({.1, .4, .4, .1}), HasSubstr("there are 4"));
-  EXPECT_THAT(by_taps({.1, .9, 0.0}), HasSubstr("taps 1 and 3 are 0.1 and 0"));
-  EXPECT_THAT(by_taps({kNan}), HasSubstr("they sum to nan"));
-  EXPECT_THAT(by_taps(std::vector<double>(257, 1.0)), HasSubstr("there are more than 255"));
+  EXPECT_THAT(converting([&](auto& options, auto&) {
+                options.acquisition.kind = Acquisition::Kind::kTaps;
+                options.acquisition.taps = {kNan};
+              }),
+              HasSubstr("they sum to nan"));
 }
 
 TEST_F(HandedIn, TapsOfAnySumKeepLevelGroundWhereItIs) {
@@ -290,13 +284,6 @@ TEST_F(HandedIn, FunctionsOnArchivesRefuseWhatIsNotThere) {
               HasSubstr("no reference system"));
   EXPECT_THAT(refusal([&] { shade_rows(reader, {}, nullptr); }), HasSubstr("there is no function"));
   EXPECT_THAT(refusal([&] { subtract_archives(archive(), archive(), nullptr); }), HasSubstr("there is no function"));
-  const auto source = waves();
-  ConvertOptions options;
-  options.z_range = {0.0, 1000.0};
-  for (const ShardNumber& shard : {ShardNumber{0, 1}, ShardNumber{2, 1}, ShardNumber{-1, -1}}) {
-    EXPECT_THAT(refusal([&] { (void)convert_shard(*source, shard, folder / "s.isohf", options); }),
-                HasSubstr("there is no shard"));
-  }
 }
 
 }  // namespace

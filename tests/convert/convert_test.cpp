@@ -8,13 +8,10 @@
 #include <functional>
 #include <limits>
 #include <numbers>
-#include <random>
 #include <string>
 
 #include "isohf/archive.h"
 #include "isohf/error.h"
-#include "isohf/lattice/barycentric.h"
-#include "isohf/sampling/resample/kernels.h"
 #include "isohf/surface.h"
 #include "isohf/verify.h"
 #include "support/error_of.h"
@@ -40,11 +37,6 @@ class Convert : public testing::Test {
     return options;
   }
 
-  static ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options,
-                            const Job& job = {}) {
-    return convert(source, output, options, job);
-  }
-
   const test::TemporaryFolder folder_;
 };
 
@@ -58,7 +50,7 @@ test::MemorySource<std::int16_t> hills(std::int64_t width = 90, std::int64_t hei
 /// What a caller gets wrong is one error, before a file is made.
 TEST_F(Convert, RefusesWhatCallersGetWrong) {
   const auto message = [&](HeightSource& source, const ConvertOptions& options, const Job& job = {}) -> std::string {
-    const Error error = test::error_of([&] { run(source, path("wrong.isohf"), options, job); });
+    const Error error = test::error_of([&] { convert(source, path("wrong.isohf"), options, job); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument) << error.what();
     return error.what();
   };
@@ -103,7 +95,7 @@ TEST_F(Convert, APatternWithoutAPlaceIsJoined) {
   });
   ConvertOptions options = small_tiles(Filter::kLimitedCubic);
   options.plan.ground.wrap_x = true;
-  const ConvertSummary summary = run(pattern, path("a.isohf"), options);
+  const ConvertSummary summary = convert(pattern, path("a.isohf"), options);
   EXPECT_TRUE(summary.metadata.wraps_x);
   EXPECT_NEAR(summary.metadata.grid.world_width(), kColumns, 1e-9) << "a period, not one spacing less";
   EXPECT_TRUE(verify_archive(path("a.isohf")).passed());
@@ -115,14 +107,14 @@ TEST_F(Convert, APatternWithoutAPlaceIsJoined) {
   }
   // What has a place is not all the way round because it is wished for.
   pattern.mutable_info().georeference.has_origin = true;
-  EXPECT_THROW(run(pattern, path("b.isohf"), options), Error);
+  EXPECT_THROW(convert(pattern, path("b.isohf"), options), Error);
 }
 
 TEST_F(Convert, RowsAreReadOnceFromNorthToSouth) {
   auto source = hills();
   ConvertOptions options = small_tiles();
   options.lossless = true;
-  (void)run(source, path("hills.isohf"), options);
+  (void)convert(source, path("hills.isohf"), options);
   const ArchiveReader archive(path("hills.isohf"));
   const SampleGrid grid = natural_grid(archive.metadata());
   RowReader rows(archive, grid);
@@ -141,7 +133,7 @@ TEST_F(Convert, RowsAreReadOnceFromNorthToSouth) {
 
 TEST_F(Convert, WritesAnArchiveThatVerifies) {
   auto source = hills();
-  const ConvertSummary summary = run(source, path("hills.isohf"), small_tiles());
+  const ConvertSummary summary = convert(source, path("hills.isohf"), small_tiles());
   EXPECT_EQ(summary.tiles_written, summary.tiles_expected);
   EXPECT_EQ(summary.tiles_expected, summary.metadata.grid.tile_count());
   EXPECT_EQ(summary.archive_bytes, fs::file_size(path("hills.isohf")));
@@ -162,7 +154,7 @@ TEST_F(Convert, APlaneGoesOnOverTheOuterHalfPixelsWhereNothingLiesBeyond) {
     options.plan.fit = true;
     options.plan.outside = outside;
     options.overwrite = true;
-    (void)run(source, path("plane.isohf"), options);
+    (void)convert(source, path("plane.isohf"), options);
     const ArchiveReader archive(path("plane.isohf"));
     const std::vector<double> elevations = archive.read_elevations({0, 0});
     // Vertex (1, 1) lies on the West edge, half a sample before the first.
@@ -176,7 +168,7 @@ TEST_F(Convert, AQuadraticComesBackWithinTheBilinearBound) {
   test::MemorySource<float> source(SampleType::kFloat32, 100, 100, [](std::int64_t c, std::int64_t r) {
     return 0.5 * kCurvature * static_cast<double>(c * c + r * r);
   });
-  const ConvertSummary summary = run(source, path("bowl.isohf"), small_tiles());
+  const ConvertSummary summary = convert(source, path("bowl.isohf"), small_tiles());
   const ArchiveReader archive(path("bowl.isohf"));
   const AccuracyReport report = compare_with_source(archive, source);
   EXPECT_EQ(report.samples_compared, 100 * 100);
@@ -194,7 +186,7 @@ TEST_F(Convert, TheBytesAreTheSameForAnyNumberOfThreads) {
     for (const int threads : {1, 2, 3, 7}) {
       ConvertOptions options = small_tiles(filter);
       options.overwrite = true;
-      (void)run(source, path("t.isohf"), options, {.threads = threads});
+      (void)convert(source, path("t.isohf"), options, {.threads = threads});
       const std::string bytes = test::read_file(path("t.isohf"));
       if (first.empty()) first = bytes;
       EXPECT_TRUE(bytes == first) << threads << " threads, " << to_string(filter);
@@ -204,7 +196,7 @@ TEST_F(Convert, TheBytesAreTheSameForAnyNumberOfThreads) {
 
 TEST_F(Convert, ReadsTheSourceTwiceAtMost) {
   auto source = hills(200, 400);
-  (void)run(source, path("once.isohf"), small_tiles());
+  (void)convert(source, path("once.isohf"), small_tiles());
   EXPECT_LE(source.rows_read, 2 * 400);
 }
 
@@ -218,7 +210,7 @@ TEST_F(Convert, VoidsStayVoidAndAreCounted) {
     ConvertOptions options = small_tiles();
     options.code_type = type;
     options.overwrite = true;
-    const ConvertSummary summary = run(source, path("voids.isohf"), options);
+    const ConvertSummary summary = convert(source, path("voids.isohf"), options);
     EXPECT_GT(summary.metadata.statistics.voids, 0);
     EXPECT_GE(*summary.metadata.statistics.min, 400.0) << "the void value never becomes an elevation";
     const VerifyReport report = verify_archive(path("voids.isohf"), {});
@@ -238,8 +230,8 @@ TEST_F(Convert, AHoleOnOneSideAloneIsCountedAsAFault) {
   for (std::int64_t r = 20; r < 50; ++r) {
     for (std::int64_t c = 30; c < 60; ++c) holed.at(c, r) = -32768;
   }
-  (void)run(whole, path("whole.isohf"), small_tiles());
-  (void)run(holed, path("holed.isohf"), small_tiles());
+  (void)convert(whole, path("whole.isohf"), small_tiles());
+  (void)convert(holed, path("holed.isohf"), small_tiles());
   const AccuracyReport invented = compare_with_source(ArchiveReader(path("whole.isohf")), holed);
   EXPECT_GT(invented.invented_inside, 400);  // of 30 x 30, but for a few samples at each side
   EXPECT_EQ(invented.lost_inside, 0);
@@ -259,7 +251,7 @@ TEST_F(Convert, EveryFilterStaysInsideItsCodes) {
       options.filter = filter_from_string(filter);
       options.step = step;
       options.overwrite = true;
-      const ConvertSummary summary = run(source, path("checker.isohf"), options);
+      const ConvertSummary summary = convert(source, path("checker.isohf"), options);
       EXPECT_EQ(summary.metadata.statistics.clamped, 0) << filter;
       EXPECT_TRUE(verify_archive(path("checker.isohf"), {}).passed()) << filter;
     }
@@ -269,7 +261,7 @@ TEST_F(Convert, EveryFilterStaysInsideItsCodes) {
 TEST_F(Convert, NothingButVoidsIsRefusedAndLeavesNothing) {
   test::MemorySource<float> source(SampleType::kFloat32, 30, 30,
                                    [](std::int64_t, std::int64_t) { return std::numeric_limits<double>::quiet_NaN(); });
-  EXPECT_THROW((void)run(source, path("nan.isohf"), small_tiles()), Error);
+  EXPECT_THROW((void)convert(source, path("nan.isohf"), small_tiles()), Error);
   EXPECT_TRUE(fs::is_empty(folder_.path()));
 }
 
@@ -277,7 +269,7 @@ TEST_F(Convert, RadiiOfAWholeMoonKeepTheirDecimals) {
   test::MemorySource<double> source(SampleType::kFloat64, 40, 40, [](std::int64_t c, std::int64_t r) {
     return 1737400.0 + 0.001 * static_cast<double>(c) + 0.002 * static_cast<double>(r);
   });
-  const ConvertSummary summary = run(source, path("moon.isohf"), small_tiles());
+  const ConvertSummary summary = convert(source, path("moon.isohf"), small_tiles());
   const ArchiveReader archive(path("moon.isohf"));
   EXPECT_LE(compare_with_source(archive, source).max, summary.step + 1e-7);
 }

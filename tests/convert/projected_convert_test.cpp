@@ -2,9 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <bit>
 #include <cmath>
-#include <filesystem>
 
 #include "isohf/archive.h"
 #include "isohf/convert.h"
@@ -65,10 +63,6 @@ ConvertOptions options_for(const std::string& projection) {
   return options;
 }
 
-ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options) {
-  return convert(source, output, options);
-}
-
 const Ground kGrounds[] = {{"Earth", {}, {-3.0, 42.0, 5.0, 50.0}},
                            {"Mars", {3396190.0, 169.894447223612}, {130.0, -12.0, 142.0, -2.0}}};
 
@@ -84,11 +78,10 @@ TEST(ProjectedArchive, HeightsLieAtTheirLongitudeAndLatitude) {
     for (const std::string kind : {"equirectangular", "local", "transverse-mercator", "utm", "lambert-conformal"}) {
       if (kind == "utm" && std::string(ground.body) != "Earth") continue;
       SCOPED_TRACE(kind + " on " + ground.body);
-      const auto owner = source_over(ground, 300, 300);
-      Source& source = *owner;
+      const auto source = source_over(ground, 300, 300);
       ConvertOptions options = options_for(kind);
       options.overwrite = true;
-      (void)run(source, folder / "a.isohf", options);
+      (void)convert(*source, folder / "a.isohf", options);
       const ArchiveReader archive(folder / "a.isohf");
       const Metadata& metadata = archive.metadata();
       const Projection map(metadata.projection->spec);
@@ -125,19 +118,18 @@ TEST(ProjectedArchive, PassesEveryCheckAgainstItsSource) {
                                      std::pair{"transverse-mercator", across}, std::pair{"polar-stereographic", cap}}) {
     for (const char* filter : {"bilinear", "limited-cubic", "bspline3"}) {
       SCOPED_TRACE(std::string(kind) + " " + filter);
-      const auto owner = source_over(ground, 240, 150);
-      Source& source = *owner;
-      for (int i = 0; i < 40; ++i) source.at(37 + i % 8, 60 + i / 8) = std::numeric_limits<float>::quiet_NaN();
+      const auto source = source_over(ground, 240, 150);
+      for (int i = 0; i < 40; ++i) source->at(37 + i % 8, 60 + i / 8) = std::numeric_limits<float>::quiet_NaN();
       ConvertOptions options = options_for(kind);
       options.filter = filter_from_string(filter);
       options.overwrite = true;
-      (void)run(source, folder / "a.isohf", options);
+      (void)convert(*source, folder / "a.isohf", options);
       EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
       const ArchiveReader archive(folder / "a.isohf");
-      const VertexReport vertices = check_vertices(archive, source);
+      const VertexReport vertices = check_vertices(archive, *source);
       EXPECT_EQ(vertices.wrong, 0);
       EXPECT_GT(vertices.vertices, 10000);
-      const AccuracyReport accuracy = compare_with_source(archive, source);
+      const AccuracyReport accuracy = compare_with_source(archive, *source);
       EXPECT_EQ(accuracy.samples, 240 * 150);
       EXPECT_EQ(accuracy.samples_void, 40);
       EXPECT_EQ(accuracy.lost_inside, 0);
@@ -151,16 +143,15 @@ TEST(ProjectedArchive, PassesEveryCheckAgainstItsSource) {
 
 TEST(ProjectedArchive, LosslessDoesNotDecideTheProjection) {
   const test::TemporaryFolder folder;
-  const auto owner = source_over(kGrounds[0], 200, 220);
-  Source& source = *owner;
+  const auto source = source_over(kGrounds[0], 200, 220);
   ConvertOptions options = options_for("auto");
-  const Metadata without = run(source, folder / "a.isohf", options).metadata;
+  const Metadata without = convert(*source, folder / "a.isohf", options).metadata;
   EXPECT_NE(without.projection->spec.kind, ProjectionKind::kEquirectangular);
   options.lossless = true;
-  const Metadata with = run(source, folder / "b.isohf", options).metadata;
+  const Metadata with = convert(*source, folder / "b.isohf", options).metadata;
   EXPECT_EQ(with.projection->spec, without.projection->spec);
   options.plan.ground.projection = ProjectionRequest::parse("local");
-  EXPECT_EQ(run(source, folder / "c.isohf", options).metadata.projection->spec.kind, ProjectionKind::kLocal);
+  EXPECT_EQ(convert(*source, folder / "c.isohf", options).metadata.projection->spec.kind, ProjectionKind::kLocal);
 }
 
 TEST(JoinedGlobe, TilesAcrossTheJoinShareTheirVertices) {
@@ -180,7 +171,7 @@ TEST(JoinedGlobe, TilesAcrossTheJoinShareTheirVertices) {
       options.plan.ground.wrap_x = true;
       options.filter = filter_from_string(filter);
       options.overwrite = true;
-      (void)run(source, folder / "a.isohf", options);
+      (void)convert(source, folder / "a.isohf", options);
       const ArchiveReader archive(folder / "a.isohf");
       const TileGrid& grid = archive.grid();
       EXPECT_TRUE(archive.metadata().wraps_x);
@@ -223,10 +214,10 @@ TEST(JoinedGlobe, TilesAcrossTheJoinShareTheirVertices) {
 
 TEST(JoinedGlobe, AnInputThatDoesNotGoRoundIsRefused) {
   const test::TemporaryFolder folder;
-  const auto owner = source_over(kGrounds[0], 200, 220);
+  const auto source = source_over(kGrounds[0], 200, 220);
   ConvertOptions options = options_for("auto");
   options.plan.ground.wrap_x = true;
-  EXPECT_STREQ(test::error_of([&] { (void)run(*owner, folder / "a.isohf", options); }).what(),
+  EXPECT_STREQ(test::error_of([&] { (void)convert(*source, folder / "a.isohf", options); }).what(),
                "memory: `wrap_x` needs columns all the way round, 360 degrees; this input's 200 columns 0.04 apart "
                "make 8");
 }

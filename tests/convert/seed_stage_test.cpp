@@ -53,11 +53,6 @@ ConvertOptions options_with(const ShadowSeedRequest& request, CodeType type = Co
   return options;
 }
 
-ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options,
-                   const Job& job = {}) {
-  return convert(source, output, options, job);
-}
-
 /// S at the edge where light enters each tile of a row of tiles, carried through all of it.
 void for_each_edge(const ArchiveReader& archive, LightTravel travel, double sun_deg,
                    const std::function<void(TileIndex, const TileCodes&, std::span<const double>)>& check) {
@@ -107,7 +102,7 @@ TEST(SeedStage, HullsGiveTheShadowThatIsCarriedFromTileToTile) {
   const test::TemporaryFolder folder;
   Ridges source;
   for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
-    const ConvertSummary summary = run(source, folder / "a.isohf", options_with({2.0}, type));
+    const ConvertSummary summary = convert(source, folder / "a.isohf", options_with({2.0}, type));
     ASSERT_GT(summary.metadata.grid.tile_columns(), 8);
     const ArchiveReader archive(folder / "a.isohf");
     const ShadowSeedReader reader(archive);
@@ -129,7 +124,7 @@ TEST(SeedStage, FeetAndMetresAreKeptApart) {
   source.mutable_info().vertical_unit = "foot";
   source.mutable_info().metres_per_vertical_unit = 0.3048;
   source.mutable_info().georeference.unit = HorizontalUnit::kMetre;
-  (void)run(source, folder / "a.isohf", options_with({2.0}));
+  (void)convert(source, folder / "a.isohf", options_with({2.0}));
   const ArchiveReader archive(folder / "a.isohf");
   EXPECT_NEAR(ShadowSeedReader(archive).info().elevation_units_per_world_unit, 1.0 / 0.3048, 1e-12);
 }
@@ -137,7 +132,7 @@ TEST(SeedStage, FeetAndMetresAreKeptApart) {
 TEST(SeedStage, ArchivesWithSeedsVerifyAndUnzip) {
   const test::TemporaryFolder folder;
   Ridges source;
-  (void)run(source, folder / "a.isohf", options_with({2.0}));
+  (void)convert(source, folder / "a.isohf", options_with({2.0}));
   const VerifyReport report = verify_archive(folder / "a.isohf", {});
   for (const Finding& finding : report.findings) ADD_FAILURE() << finding_name(finding.id) << " " << finding.text;
   EXPECT_TRUE(report.passed());
@@ -153,12 +148,12 @@ TEST(SeedStage, AResumeFromAnyTileGivesTheSameBytes) {
   const test::TemporaryFolder folder;
   Ridges source;
   ConvertOptions options = options_with({2.0});
-  (void)run(source, folder / "whole.isohf", options);
+  (void)convert(source, folder / "whole.isohf", options);
   const std::string whole = test::read_file(folder / "whole.isohf");
   // Interrupted before the last row of tiles; by one thread, which is never so far behind the reading that it has
   // written next to nothing.
   source.fail_from_row = 59;
-  EXPECT_THROW((void)run(source, folder / "a.isohf", options, {.threads = 1}), Error);
+  EXPECT_THROW((void)convert(source, folder / "a.isohf", options, {.threads = 1}), Error);
   source.fail_from_row = std::numeric_limits<std::int64_t>::max();
   const std::string part = test::read_file(folder / "a.isohf.part");
   const std::string journal = test::read_file(folder / "a.isohf.part.journal");
@@ -168,7 +163,7 @@ TEST(SeedStage, AResumeFromAnyTileGivesTheSameBytes) {
     fs::remove(folder / "a.isohf");
     test::write_file(folder / "a.isohf.part", part);
     test::write_file(folder / "a.isohf.part.journal", journal.substr(0, kept));
-    (void)run(source, folder / "a.isohf", options);
+    (void)convert(source, folder / "a.isohf", options);
     ASSERT_TRUE(test::read_file(folder / "a.isohf") == whole) << kept << " bytes of the journal";
   }
 }
@@ -177,7 +172,7 @@ TEST(SeedStage, RefusesSunsThatAreNone) {
   const test::TemporaryFolder folder;
   Ridges source(40, 40);
   for (const ShadowSeedRequest& request : std::vector<ShadowSeedRequest>{{0.0}, {90.0}, {NAN}}) {
-    EXPECT_THROW((void)run(source, folder / "a.isohf", options_with(request)), Error);
+    EXPECT_THROW((void)convert(source, folder / "a.isohf", options_with(request)), Error);
     EXPECT_FALSE(fs::exists(folder / "a.isohf"));
   }
 }
@@ -193,7 +188,7 @@ TEST(ShadowSeedReader, SaysWhereThereAreNoSeeds) {
   Ridges source(40, 40);
   ConvertOptions options = options_with({});
   options.shadow_seeds.reset();
-  (void)run(source, folder / "a.isohf", options);
+  (void)convert(source, folder / "a.isohf", options);
   const ArchiveReader archive(folder / "a.isohf");
   EXPECT_THROW(ShadowSeedReader reader(archive), Error);
 }

@@ -48,11 +48,6 @@ ConvertOptions options_for(MemoryPhoto& photo, TextureFormat format = TextureFor
   return options;
 }
 
-ConvertSummary run(HeightSource& source, const std::string& output, const ConvertOptions& options,
-                   const Job& job = {}) {
-  return convert(source, output, options, job);
-}
-
 std::string message_of(const std::function<void()>& action) {
   const Error error = test::error_of(action);
   EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
@@ -144,7 +139,7 @@ TEST(TextureStage, StoresWhatTheCutterCutsForEveryTileWithGround) {
   const test::TemporaryFolder folder;
   Hills source;
   MemoryPhoto photo(500, 400, 3, noise);
-  const ConvertSummary summary = run(source, folder / "a.isohf", options_for(photo));
+  const ConvertSummary summary = convert(source, folder / "a.isohf", options_for(photo));
   ASSERT_TRUE(texture_info(summary.metadata));
   EXPECT_GT(summary.tiles_void, 0);
   const ArchiveReader archive(folder / "a.isohf");
@@ -204,7 +199,7 @@ TEST(TextureStage, RefusesOptionsOutOfRange) {
   for (const int size : {0, -64, 32, 65, 100, 8192}) {
     ConvertOptions options = options_for(photo);
     options.texture->max_size = size;
-    EXPECT_THAT(message_of([&] { (void)run(source, folder / "a.isohf", options); }), HasSubstr("`max_size`"));
+    EXPECT_THAT(message_of([&] { (void)convert(source, folder / "a.isohf", options); }), HasSubstr("`max_size`"));
   }
   EXPECT_TRUE(folder.names().empty());
 }
@@ -216,12 +211,12 @@ TEST(TextureStage, PicksTheFormatByAlpha) {
     MemoryPhoto photo(40, 40, channels, noise);
     ConvertOptions options = options_for(photo);
     options.texture->format.reset();
-    const ConvertSummary summary = run(source, folder / "a.isohf", options);
+    const ConvertSummary summary = convert(source, folder / "a.isohf", options);
     EXPECT_EQ(texture_info(summary.metadata)->format, channels == 4 ? TextureFormat::kPng : TextureFormat::kJpeg);
     EXPECT_EQ(texture_info(summary.metadata)->channels, channels);
     EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
     options.texture->format = TextureFormat::kJpeg;
-    const ConvertSummary jpeg = run(source, folder / "a.isohf", options);
+    const ConvertSummary jpeg = convert(source, folder / "a.isohf", options);
     EXPECT_EQ(texture_info(jpeg.metadata)->channels, std::min(channels, 3));
     EXPECT_EQ(jpeg.warnings.size(), channels == 4 ? 1U : 0U);
     EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
@@ -240,7 +235,7 @@ TEST(TextureStage, ShowsNothingBeyondAPhotoOfAPartOfTheGround) {
     photo.mutable_info().georeference = utm(500010.5, 3999979.5, 1.0);  // columns 10 to 29, rows 20 to 43
     ConvertOptions options = options_for(photo);
     options.texture->format.reset();
-    const ConvertSummary summary = run(source, folder / "a.isohf", options);
+    const ConvertSummary summary = convert(source, folder / "a.isohf", options);
     EXPECT_EQ(texture_info(summary.metadata)->format, TextureFormat::kPng);
     EXPECT_EQ(texture_info(summary.metadata)->photo_width, 20);
     EXPECT_TRUE(verify_archive(folder / "a.isohf", {}).passed());
@@ -274,7 +269,7 @@ TEST(TextureStage, ShowsNothingBeyondAPhotoOfAPartOfTheGround) {
     EXPECT_GT(beyond, 300);
     // JPEG has no way to say so.
     options.texture->format = TextureFormat::kJpeg;
-    EXPECT_EQ(texture_info(run(source, folder / "a.isohf", options).metadata)->channels, std::min(channels, 3));
+    EXPECT_EQ(texture_info(convert(source, folder / "a.isohf", options).metadata)->channels, std::min(channels, 3));
   }
 }
 
@@ -303,19 +298,19 @@ TEST(TextureStage, ResumesToTheSameBytesWhereverItWasCut) {
     ConvertOptions options = options_for(photo);
     if (with_seeds) options.shadow_seeds.emplace();
     const Job job{.threads = 2};
-    EXPECT_GT(run(source, folder / "whole.isohf", options, job).plane_bytes, 0U);
+    EXPECT_GT(convert(source, folder / "whole.isohf", options, job).plane_bytes, 0U);
     const std::string whole = read_file(folder / "whole.isohf");
     photo.pixels_read = 0;
-    (void)run(source, folder / "whole.isohf", options, job);
+    (void)convert(source, folder / "whole.isohf", options, job);
     const std::int64_t all = photo.pixels_read;
     for (const double share : {0.0, 0.1, 0.35, 0.6, 0.9, 0.99}) {
       FailingPhoto failing(photo, static_cast<std::int64_t>(share * static_cast<double>(all)));
       options.texture->photo = &failing;
       options.resume = false;
-      EXPECT_THROW((void)run(source, folder / "cut.isohf", options, job), Error);
+      EXPECT_THROW((void)convert(source, folder / "cut.isohf", options, job), Error);
       options.texture->photo = &photo;
       options.resume = true;
-      (void)run(source, folder / "cut.isohf", options, job);
+      (void)convert(source, folder / "cut.isohf", options, job);
       EXPECT_EQ(read_file(folder / "cut.isohf"), whole) << share;
     }
   }
@@ -328,11 +323,11 @@ TEST(TextureStage, WillNotResumeWithAnotherTexture) {
   FailingPhoto failing(photo, 100000);
   ConvertOptions options = options_for(photo);
   options.texture->photo = &failing;
-  EXPECT_THROW((void)run(source, folder / "cut.isohf", options), Error);
+  EXPECT_THROW((void)convert(source, folder / "cut.isohf", options), Error);
   options.texture->photo = &photo;
   options.resume = true;
   options.texture->max_size = 128;
-  EXPECT_THAT(message_of([&] { (void)run(source, folder / "cut.isohf", options); }), HasSubstr("other options"));
+  EXPECT_THAT(message_of([&] { (void)convert(source, folder / "cut.isohf", options); }), HasSubstr("other options"));
 }
 
 TEST(TextureStage, CountsAgainstTheMemoryAllowed) {
@@ -341,9 +336,9 @@ TEST(TextureStage, CountsAgainstTheMemoryAllowed) {
   MemoryPhoto photo(300, 220, 3, noise);
   ConvertOptions options = options_for(photo);
   const Job job{.memory_bytes = 110000000};  // the photo's reader alone takes more
-  EXPECT_THROW((void)run(source, folder / "a.isohf", options, job), Error);
+  EXPECT_THROW((void)convert(source, folder / "a.isohf", options, job), Error);
   options.texture.reset();
-  EXPECT_NO_THROW((void)run(source, folder / "a.isohf", options, job));
+  EXPECT_NO_THROW((void)convert(source, folder / "a.isohf", options, job));
 }
 
 /// Findings of kTexture after the file's bytes were changed.
@@ -360,7 +355,7 @@ TEST(TextureStage, VerifyNamesADamagedTexture) {
   Hills source;
   MemoryPhoto photo(300, 220, 3, noise);
   for (const TextureFormat format : {TextureFormat::kPng, TextureFormat::kJpeg}) {
-    (void)run(source, folder / "a.isohf", options_for(photo, format));
+    (void)convert(source, folder / "a.isohf", options_for(photo, format));
     const std::string name = format == TextureFormat::kPng ? "textures/1/2/32.png" : "textures/1/2/32.jpg";
     const std::string bytes = read_file(folder / "a.isohf");
     const std::size_t header = bytes.find(name) - 30;

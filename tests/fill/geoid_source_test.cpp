@@ -5,7 +5,6 @@
 
 #include <GeographicLib/Geoid.hpp>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 
 #include "isohf/error.h"

@@ -379,6 +379,9 @@ TEST_F(Shards, AreRefusedWithoutWhatNoneCanKnow) {
     return refusal([&] { (void)convert_shard(source, shard, folder / "a.isohf", options); });
   };
   EXPECT_THAT(refused({4, 3}), HasSubstr("there is no shard 4 of 3"));
+  for (const ShardNumber& shard : {ShardNumber{0, 1}, ShardNumber{2, 1}, ShardNumber{-1, -1}}) {
+    EXPECT_THAT(refused(shard), HasSubstr("there is no shard"));
+  }
   EXPECT_THAT(refused({1, 1000}), HasSubstr("1000 shards are too many: the rows of tiles make "));
   options.z_range.reset();
   EXPECT_THAT(refused({1, 3}), HasSubstr("a shard needs `z_range`"));

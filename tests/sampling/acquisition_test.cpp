@@ -80,6 +80,7 @@ TEST(Acquisition, TapsAreDividedByTheirSumWhereTheyAreUsed) {
 
 TEST(Acquisition, TapsThatAreNoFilterAreRefusedWithWhatOneIs) {
   for (const auto& [text, why] : {std::pair{"1,1", "there are 2"},
+                                  {"1,4,4,1", "there are 4"},
                                   {"1,2,1.01", "taps 1 and 3 are 1 and 1.01"},
                                   {"1,-2,1", "they sum to 0"},
                                   {"0", "they sum to 0"}}) {

@@ -374,22 +374,6 @@ TEST(Prefilter, NothingIsSeenAcrossAWallOfVoids) {
   }
 }
 
-TEST(Prefilter, FarFromVoidsTheyChangeNothing) {
-  const Prefilter prefilter = make(Filter::kBspline3);
-  Raster a = random_raster(100, 90, 1);
-  Raster b = a;
-  b.view()(50, 45) = kVoid;
-  prefilter.filter(a.view());
-  prefilter.filter(b.view());
-  for (std::int64_t r = 0; r < 90; ++r) {
-    for (std::int64_t c = 0; c < 100; ++c) {
-      if (std::max(std::abs(c - 50), std::abs(r - 45)) > prefilter.halo()) {
-        ASSERT_EQ(a.view()(c, r), b.view()(c, r));
-      }
-    }
-  }
-}
-
 TEST(Prefilter, LoneSamplesAreLevelGround) {
   Raster raster{9, 9, std::vector<float>(81, kVoid)};
   raster.view()(4, 4) = 77.25F;

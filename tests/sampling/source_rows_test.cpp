@@ -4,10 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
-#include <filesystem>
 #include <map>
-#include <numeric>
-#include <set>
 
 #include "isohf/error.h"
 #include "support/error_of.h"

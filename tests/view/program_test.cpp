@@ -148,28 +148,13 @@ TEST_F(ViewProgramTest, GrowsNoMoreThanItsMemoryBound) {
   test::write_analytic_archive(path("wide.isohf"), wide);
   const auto peak_mib = [&](const std::string& memory) {
     // Looking up: what the driver takes for triangles would hide what tiles take.
-    const std::vector<std::string> words{ISOHF_BIN_DIR "/isohf-view",
-                                         path("wide.isohf"),
-                                         "-q",
-                                         "--overwrite",
-                                         "--size",
-                                         "64x48",
-                                         "--far",
-                                         "12000",
-                                         "--position",
-                                         "16000,200,12800",
-                                         "--look-at",
-                                         "16001,99000,12800",
-                                         "--screenshot",
-                                         path("up.png"),
-                                         "--memory",
-                                         memory};
-    std::vector<char*> command;
-    for (const std::string& word : words) command.push_back(const_cast<char*>(word.c_str()));
-    command.push_back(nullptr);
+    const std::string command =
+        "exec '" ISOHF_BIN_DIR "/isohf-view' " + path("wide.isohf") +
+        " -q --overwrite --size 64x48 --far 12000 --position 16000,200,12800 --look-at 16001,99000,12800 --memory " +
+        memory + " --screenshot " + path("up.png");
     const pid_t child = ::fork();
     if (child == 0) {
-      ::execv(command[0], command.data());
+      ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
       ::_exit(127);
     }
     int status = -1;
@@ -195,7 +180,6 @@ TEST_F(ViewProgramTest, RefusesInOneLine) {
     std::string before = "";
   };
   for (const Case& one : std::vector<Case>{
-           {path("missing.isohf") + " --verify", 1, "no such file"},
            {path("text.isohf") + " --verify", 1, "text.isohf"},
            {good + " --verify", 1, "OpenGL 3.3", "MESA_GL_VERSION_OVERRIDE=2.1"},
            {good, 1, "; --screenshot PICTURE.png draws without one\n", "env -u DISPLAY -u WAYLAND_DISPLAY"},
@@ -351,9 +335,6 @@ TEST_F(ViewProgramTest, IsStartedByIsohfView) {
   EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
   EXPECT_TRUE(is_png("view.png"));
   EXPECT_EQ(test::run_isohf({"-q", "view", path("good.isohf"), "--verify"}).out, "");
-  const Outcome refused = test::run_isohf({"view", path("good.isohf"), "--mode", "puce"});
-  EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_EQ(refused.err.rfind("isohf: view: --mode: found 'puce'", 0), 0U) << refused.err;
 }
 
 /// What a hand does: 60 notches of the wheel at nine places, drags with every button, a flight, and then nothing.
