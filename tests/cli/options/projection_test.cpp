@@ -10,12 +10,10 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <span>
-#include <sstream>
 
 #include "formats/registry.h"
 #include "isohf/raster.h"
 #include "support/rasters/degree_grid.h"
-#include "support/rasters/small_geoid.h"
 #include "support/real_files.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
@@ -69,45 +67,6 @@ TEST_F(ProjectionCommand, PlanConvertAndInfoSayWhatWasTakenWhyAndHowFarLengthsEr
   EXPECT_EQ(plan.at("projection"), info.at("metadata").at("projection"));
   EXPECT_EQ(plan.at("projection").at("kind"), "lambert-conformal");
   EXPECT_EQ(plan.at("wraps_x"), false);
-}
-
-TEST_F(ProjectionCommand, EveryKindPassesEveryCheckAndHasItsPlacesInDegrees) {
-  for (const std::string kind :
-       {"equirectangular", "local", "local:8.5,46", "transverse-mercator", "transverse-mercator:9,0.9996", "utm",
-        "utm:32N", "lambert-conformal", "lambert-conformal:44,48,8", "polar-stereographic:45"}) {
-    SCOPED_TRACE(kind);
-    converts({"--projection", kind, "--step", "0.02"});
-    const RunResult verified = isohf({"verify", folder / "a.isohf", "--against", folder / "wide.flt", "--json"});
-    ASSERT_EQ(verified.exit_code, 0) << verified.out << verified.err;
-    const json against = json::parse(verified.out).at("against");
-    EXPECT_EQ(against.at("samples"), 240 * 160);
-    EXPECT_EQ(against.at("samples_lost"), 0);
-    EXPECT_EQ(against.at("vertices").at("wrong"), 0);
-    const RunResult sampled = isohf({"sample", folder / "a.isohf", "--at-lonlat", "3.3", "43.7", "--at-lonlat", "12.9",
-                                     "48.4", "--at-lonlat", "367.1", "45.2", "--json"});
-    ASSERT_EQ(sampled.exit_code, 0) << sampled.err;
-    std::istringstream lines(sampled.out);
-    for (const auto& [longitude, latitude] : {std::pair{3.3, 43.7}, std::pair{12.9, 48.4}, std::pair{7.1, 45.2}}) {
-      std::string line;
-      ASSERT_TRUE(std::getline(lines, line));
-      const json at = json::parse(line);
-      ASSERT_EQ(at.at("state"), "surface") << line;
-      // Triangles of 4 km on waves of 280 a degree and 500 a square degree: 0.05 * 0.05 * 500 / 8 is 0.16.
-      EXPECT_NEAR(at.at("elevation").get<double>(), land(longitude, latitude), 0.6) << line;
-    }
-    EXPECT_EQ(isohf({"sample", folder / "a.isohf", "--at-lonlat", "-170", "10"}).out, "outside\n");
-  }
-}
-
-TEST_F(ProjectionCommand, SampleReadsDegreesFromStandardInput) {
-  converts({"--projection", "utm"});
-  RunOptions options;
-  options.input = "7.5 45.5\n# beside\n7.5,45.5\n";
-  const RunResult result = run_isohf({"sample", folder / "a.isohf", "--lonlat"}, options);
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  const std::string first = result.out.substr(0, result.out.find('\n'));
-  EXPECT_EQ(result.out, first + "\n" + first + "\n");
-  EXPECT_NEAR(std::stod(first), land(7.5, 45.5), 1.0);
 }
 
 TEST_F(ProjectionCommand, WhatDoesNotGoTogetherIsRefusedInOneLine) {
@@ -184,81 +143,6 @@ TEST_F(ProjectionCommand, ShadowsAndPicturesOfAMapAreMade) {
   EXPECT_NEAR(drawn.origin_y, exported.origin_y, 1e-6);
   EXPECT_NEAR(drawn.spacing_x, exported.spacing_x, 1e-9);
   EXPECT_EQ(isohf({"verify", folder / "a.isohf"}).exit_code, 0);
-}
-
-TEST_F(ProjectionCommand, AnInputAcrossTheAntimeridianLandsRight) {
-  // The same ground, counted on from 179.5 and from -180.5.
-  for (const double west : {179.0, -181.0}) {
-    write_degrees(folder / "across", 200, 150, west, 60.0, 0.01, [](double longitude, double latitude) {
-      return 10.0 * (std::fmod(longitude + 720.0, 360.0) - 180.0) + 3.0 * latitude;
-    });
-    for (const char* kind : {"equirectangular", "transverse-mercator", "lambert-conformal"}) {
-      const RunResult result = isohf({"convert", folder / "across.flt", folder / "a.isohf", "--overwrite",
-                                      "--projection", kind, "--step", "0.001"});
-      ASSERT_EQ(result.exit_code, 0) << result.err;
-      for (const double longitude : {179.5, 180.0, -179.5}) {
-        const std::string text = std::to_string(longitude);
-        const RunResult sampled = isohf({"sample", folder / "a.isohf", "--at-lonlat", text, "60.75"});
-        const double expected = 10.0 * (std::fmod(longitude + 720.0, 360.0) - 180.0) + 3.0 * 60.75;
-        EXPECT_NEAR(std::stod(sampled.out), expected, 0.01) << kind << " " << west << " " << longitude;
-      }
-    }
-  }
-}
-
-TEST_F(ProjectionCommand, APolarCapIsWholeToThePole) {
-  write_degrees(folder / "cap", 720, 60, -180.0, 60.0, 0.5, [](double longitude, double latitude) {
-    return 50.0 * (90.0 - latitude) * (1.0 + 0.2 * std::cos(longitude * M_PI / 180.0));
-  });
-  const RunResult result = isohf({"convert", folder / "cap.flt", folder / "a.isohf", "--step", "0.05"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("polar-stereographic"));
-  const RunResult verified = isohf({"verify", folder / "a.isohf", "--against", folder / "cap.flt"});
-  EXPECT_EQ(verified.exit_code, 0) << verified.out;
-  for (const char* longitude : {"-180", "-179.8", "-90", "0", "45", "179.9"}) {
-    const RunResult sampled = isohf({"sample", folder / "a.isohf", "--at-lonlat", longitude, "75.25"});
-    const double expected = 50.0 * 14.75 * (1.0 + 0.2 * std::cos(std::stod(longitude) * M_PI / 180.0));
-    EXPECT_NEAR(std::stod(sampled.out), expected, 3.0) << longitude;
-  }
-  EXPECT_NEAR(std::stod(isohf({"sample", folder / "a.isohf", "--at-lonlat", "0", "90"}).out), 0.0, 12.0);
-}
-
-TEST_F(ProjectionCommand, ARepeatedColumnIsLeftOutOfAJoinedGlobe) {
-  const auto round = [](double longitude, double latitude) {
-    return 100.0 * std::cos(longitude * M_PI / 180.0) * std::cos(latitude * M_PI / 180.0);
-  };
-  write_degrees(folder / "globe", 72, 36, -180.0, -90.0, 5.0, round);
-  write_degrees(folder / "again", 73, 36, -180.0, -90.0, 5.0, round);
-  const RunResult globe = isohf({"convert", folder / "globe.flt", folder / "g.isohf", "--wrap-x"});
-  EXPECT_EQ(globe.exit_code, 0) << globe.err;
-  EXPECT_EQ(globe.err, "");
-  const RunResult again = isohf({"convert", folder / "again.flt", folder / "h.isohf", "--wrap-x"});
-  EXPECT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_THAT(again.err, HasSubstr("column 72 is the first one again"));
-  const auto metadata = [&](const char* name) {
-    return json::parse(isohf({"info", folder / name, "--json"}).out)["metadata"];
-  };
-  EXPECT_EQ(metadata("g.isohf").at("content_sha256"), metadata("h.isohf").at("content_sha256"));
-  EXPECT_EQ(metadata("g.isohf").at("wraps_x"), true);
-  for (const char* input : {"globe.flt", "again.flt"}) {
-    const RunResult verified = isohf({"verify", folder / "h.isohf", "--against", folder / input});
-    EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
-  }
-}
-
-TEST_F(ProjectionCommand, AGeoidMovesElevationsAndTheirDatum) {
-  write_geoid(folder / "egm96-test.pgm", 72, 37, [](double, double) { return 47.0; });
-  converts({"--geoid", folder / "egm96-test.pgm", "--projection", "equirectangular"});
-  const json info = json::parse(isohf({"info", folder / "a.isohf", "--json"}).out).at("metadata");
-  EXPECT_EQ(info.at("source").at("vertical_datum").at("name"), "the ellipsoid, by egm96-test");
-  EXPECT_NEAR(std::stod(isohf({"sample", folder / "a.isohf", "--at-lonlat", "7.5", "45.5"}).out),
-              land(7.5, 45.5) + 47.0, 1.0);
-  write_geoid(folder / "other.pgm", 72, 37, [](double, double) { return 52.0; });
-  EXPECT_EQ(isohf({"verify", folder / "a.isohf", "--against", folder / "wide.flt", "--geoid", folder / "other.pgm"})
-                .exit_code,
-            3);
-  const RunResult moved = isohf({"verify", folder / "a.isohf", "--against", folder / "wide.flt"});
-  EXPECT_EQ(moved.exit_code, 0) << moved.out;
 }
 
 TEST(MarsMegdr, LandsAtItsRadiusAndLongitude) {
