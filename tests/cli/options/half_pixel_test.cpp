@@ -211,6 +211,45 @@ TEST_F(HalfPixel, ExportedSurfacesLieWhereTheirSourceLayInEveryFormat) {
   }
 }
 
+TEST_F(HalfPixel, AnOverruledRegistrationMovesNoSample) {
+  write_ramp(folder_ / "area.tif", kSquare, Registration::kArea, SampleType::kInt16);
+  convert(folder_ / "area.tif", "a.isohf", {"--registration", "point"});
+  expect_surface("a.isohf", kSquare, false, 0.0);
+  // What its samples stand for changes, where they lie does not.
+  const json found = json::parse(run({"info", folder_ / "a.isohf", "--json"}));
+  EXPECT_EQ(found.at("metadata").at("source").at("crs").at("origin_x"), kSquare.west);
+  EXPECT_EQ(found.at("bounds").at("west"), kSquare.west);
+}
+
+TEST_F(HalfPixel, RastersWithoutAPlaceKeepTheirRegistration) {
+  RasterSpec spec;
+  spec.width = spec.height = 8;
+  spec.sample_type = SampleType::kFloat32;
+  const std::vector<float> level(64, 1.0F);
+  write_raster(folder_ / "r.exr", spec, std::as_bytes(std::span(level)));
+  for (const std::string registration : {"area", "point", "auto"}) {
+    convert(folder_ / "r.exr", "a.isohf", {"--registration", registration});
+    for (const char* name : {"back.tif", "back.r32"}) {
+      (void)run({"export", folder_ / "a.isohf", folder_ / name, "--overwrite", "-q"});
+      const SourceInfo info = read_raster(folder_ / name).info;
+      EXPECT_EQ(to_string(info.georeference.registration), registration == "area" ? "area" : "point") << name;
+      EXPECT_FALSE(info.georeference.has_origin) << name;
+      EXPECT_EQ(info.georeference.spacing_x, 1.0) << name;
+      EXPECT_TRUE(info.warnings.empty()) << name;
+    }
+  }
+}
+
+TEST_F(HalfPixel, AsciiGridsByCornerAndByCentreAreTheSamePlace) {
+  for (const std::string kind : {"corner 495", "center 500"}) {
+    write_file(folder_ / "a.asc", "ncols 3\nnrows 2\nxll" + kind + "\nyll" + kind + "\ncellsize 10\n1 2 3 4 5 6\n");
+    const Georeference place = read_raster(folder_ / "a.asc").info.georeference;
+    EXPECT_EQ(place.registration, Registration::kArea) << kind;
+    EXPECT_EQ(place.origin_x, 500.0) << kind;
+    EXPECT_EQ(place.origin_y, 510.0) << kind;
+  }
+}
+
 TEST_F(HalfPixel, HgtTilesLieWhereTheirNameSays) {
   const std::string tile = folder_ / "N10E020.hgt";
   for (const auto registration : {Registration::kArea, Registration::kPoint}) {
