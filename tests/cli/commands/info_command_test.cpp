@@ -35,16 +35,6 @@ class InfoCommand : public testing::Test {
   TemporaryFolder folder;
 };
 
-TEST_F(InfoCommand, SaysWhatTheArchiveHolds) {
-  const RunResult result = run_isohf({"info", folder / "a.isohf"});
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_EQ(result.err, "");
-  for (const char* part : {"28x35 (C x R), 2 levels", "a.tif", "200 x 100 float32", "limited-cubic", "wholly void",
-                           "bits a source sample", "sha256 "}) {
-    EXPECT_THAT(result.out, HasSubstr(part));
-  }
-}
-
 TEST_F(InfoCommand, SaysThatTransparentSamplesAreVoids) {
   RasterSpec spec;
   spec.width = 2;
@@ -181,20 +171,6 @@ TEST_F(InfoCommand, TakesNoOrdinaryElevationForAVoid) {
   EXPECT_EQ(spike_warning(folder, [](std::int64_t c,
                                      std::int64_t) { return static_cast<std::int16_t>(c == 0 ? -9999 : c * 200); }),
             "");
-}
-
-TEST_F(InfoCommand, WhatIsNoArchiveIsRefusedInOneLine) {
-  write_file(folder / "empty.isohf", "");
-  write_file(folder / "short.isohf", read_file(folder / "a.isohf").substr(0, 500));
-  for (const char* name : {"none.isohf", "empty.isohf", "short.isohf"}) {
-    for (const char* command : {"info", "sample"}) {
-      const RunResult result = run_isohf({command, folder / name});
-      EXPECT_EQ(result.exit_code, 1) << name;
-      EXPECT_EQ(result.out, "");
-      EXPECT_THAT(result.err, HasSubstr(name));
-      EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-    }
-  }
 }
 
 }  // namespace

@@ -13,33 +13,6 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 
-TEST(PlanCommand, CandidatesLieNearTheBudgetBestAspectFirst) {
-  const RunResult result = run_isohf({"plan", "--levels", "4", "--shape", "10000", "--json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const json candidates = json::parse(result.out).at("candidates");
-  ASSERT_FALSE(candidates.empty());
-  EXPECT_LE(candidates.size(), 10U);
-  double last = 0.0;
-  for (const json& shape : candidates) {
-    const double distortion = std::abs(shape.at("aspect").get<double>() - 1.0);
-    EXPECT_GE(distortion, last);
-    last = distortion;
-    EXPECT_EQ(shape.at("levels"), 4);
-    EXPECT_EQ(shape.at("index_arrays").size(), 4U);
-    EXPECT_EQ(shape.at("raw_bytes"), 2 * shape.at("stored_vertices").get<int>());
-  }
-}
-
-TEST(PlanCommand, ShapeIsDescribedOrAnsweredWithTheNearestValidOne) {
-  const json candidates = json::parse(run_isohf({"plan", "--shape", "212x243", "--json"}).out).at("candidates");
-  ASSERT_EQ(candidates.size(), 1U);
-  EXPECT_EQ(candidates[0].at("triangles"), 100080);
-  const RunResult bad = run_isohf({"plan", "--shape", "48x55", "--levels", "3"});
-  EXPECT_EQ(bad.exit_code, 2);
-  EXPECT_EQ(bad.out, "");
-  EXPECT_THAT(bad.err, HasSubstr("nearest valid shape is 48x59"));
-}
-
 TEST(PlanCommand, InputGivesTheWholePlanAndWritesNothing) {
   const TemporaryFolder folder;
   write_int16_tiff(folder / "a.tif", 300, 200,

@@ -114,14 +114,6 @@ TEST_F(BadInput, SeveralFilesWithoutAPlace) {
   EXPECT_THAT(mosaic.err, HasSubstr("does not say where it lies"));
 }
 
-TEST_F(BadInput, OutputFolderIsMissing) {
-  write_hills("a.tif");
-  const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "none/out.isohf"});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, HasSubstr("none: No such file or directory"));
-  EXPECT_EQ(folder.names(), std::vector<std::string>{"a.tif"});
-}
-
 TEST_F(BadInput, OutputIsAFolder) {
   write_hills("a.tif");
   const RunResult result = run_isohf({"convert", folder / "a.tif", "-o", folder.path(), "--overwrite"});
@@ -165,24 +157,6 @@ void write_noise(const std::string& path, int side) {
     state = state * 1664525U + 1013904223U;
     return static_cast<std::int16_t>(state >> 16);
   });
-}
-
-TEST_F(BadInput, AFullDiskKeepsWhatIsDoneForAResume) {
-  write_noise(folder / "noise.tif", 400);
-  RunOptions full;
-  full.file_size_limit_bytes = 50000;
-  const RunResult result = run_isohf({"convert", folder / "noise.tif", folder / "out.isohf"}, full);
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(result.out, "");
-  EXPECT_THAT(result.err, HasSubstr("File too large"));
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("out.isohf: cannot write"));
-  EXPECT_THAT(result.err, HasSubstr("out.isohf.part keeps what is done, --resume goes on from there"));
-  EXPECT_EQ(folder.names(), (std::vector<std::string>{"noise.tif", "out.isohf.part", "out.isohf.part.journal"}));
-  EXPECT_EQ(run_isohf({"convert", folder / "noise.tif", folder / "out.isohf", "--resume", "-q"}).exit_code, 0);
-  EXPECT_EQ(run_isohf({"convert", folder / "noise.tif", folder / "whole.isohf", "-q"}).exit_code, 0);
-  EXPECT_EQ(read_file(folder / "out.isohf"), read_file(folder / "whole.isohf"));
-  EXPECT_EQ(folder.names(), (std::vector<std::string>{"noise.tif", "out.isohf", "whole.isohf"}));
 }
 
 /// A file system in memory that holds so many bytes; needs the right to mount one.

@@ -56,19 +56,6 @@ TEST(Usage, CommonOptionsMayStandBeforeTheCommand) {
   EXPECT_THAT(run_isohf({"--config=" + (folder / "options.toml"), "formats"}).out, testing::StartsWith("{"));
 }
 
-TEST(Usage, EveryCommandHasHelpWithExamplesAndNoLineIsTooLong) {
-  for (const std::string& command : kCommands) {
-    const RunResult result = run_isohf({command, "--help"});
-    EXPECT_EQ(result.exit_code, 0);
-    EXPECT_EQ(result.err, "");
-    EXPECT_THAT(result.out, HasSubstr("Usage: isohf " + command));
-    EXPECT_THAT(result.out, HasSubstr("Examples:\n  isohf " + command));
-    EXPECT_EQ(run_isohf({"help", command}).out, result.out);
-    std::istringstream lines(result.out);
-    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 110U) << line;
-  }
-}
-
 /// The options that --help describes, not those that its text merely names: where a line begins with an option, or with
 /// its letter and the option.
 std::set<std::string> options_described_in(const std::string& help) {
