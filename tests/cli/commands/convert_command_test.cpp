@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "support/rasters/plain_tiff.h"
@@ -38,16 +37,6 @@ class ConvertCommand : public testing::Test {
   TemporaryFolder folder;
 };
 
-TEST_F(ConvertCommand, SummaryCountsTilesAndNothingElseIsLeft) {
-  const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--shape", "52x67"});
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_EQ(result.err, "");
-  for (const char* line : {"archive ", "\ntiles ", "\nsize ", "\nelevations ", "\ntime ", "\nmemory "}) {
-    EXPECT_THAT(result.out, HasSubstr(line));
-  }
-  EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.isohf", "a.tif"}));
-}
-
 TEST_F(ConvertCommand, JsonIsOneDocumentAndAgreesWithTheArchive) {
   const RunResult result = run_isohf({"convert", folder / "a.tif", "-o", folder / "a.isohf", "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -62,15 +51,6 @@ TEST_F(ConvertCommand, JsonIsOneDocumentAndAgreesWithTheArchive) {
   const json info = json::parse(run_isohf({"info", folder / "a.isohf", "--json"}).out);
   EXPECT_EQ(info.at("bytes"), summary.at("archive_bytes"));
   EXPECT_EQ(info.at("metadata"), summary.at("metadata"));
-}
-
-TEST_F(ConvertCommand, BytesDoNotDependOnThreads) {
-  const std::string one = convert("1.isohf", {"--shape", "52x67", "--threads", "1"});
-  ASSERT_FALSE(one.empty());
-  for (const std::string& threads : {std::string("2"), std::string("3"), std::string("7")}) {
-    EXPECT_EQ(convert(threads + ".isohf", {"--shape", "52x67", "-j", threads}), one) << threads;
-  }
-  EXPECT_EQ(convert("default.isohf", {"--shape", "52x67"}), one);
 }
 
 TEST_F(ConvertCommand, QuietPrintsNothing) {
@@ -108,12 +88,6 @@ TEST_F(ConvertCommand, NumbersAreRecordedAsValuesHoweverTheyAreTyped) {
     if (first.empty()) first = bytes;
     EXPECT_TRUE(bytes == first) << scale;
   }
-}
-
-TEST_F(ConvertCommand, OverwriteReplaces) {
-  const std::string old = convert("a.isohf", {"--density", "0.5"});
-  EXPECT_NE(convert("a.isohf", {"--overwrite"}), old);
-  EXPECT_EQ(folder.names(), (std::vector<std::string>{"a.isohf", "a.tif"}));
 }
 
 TEST_F(ConvertCommand, FractionsAreWarnedOfUnlessScaled) {

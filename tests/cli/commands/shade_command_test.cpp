@@ -270,24 +270,6 @@ TEST_F(ShadeCommand, TellsOfReliefThatCannotBeSeen) {
   EXPECT_EQ(said({"-q"}), "");
 }
 
-TEST_F(ShadeCommand, BytesDoNotDependOnThreads) {
-  const std::vector<std::string> options = {"--azimuth", "160", "--size", "77x33", "-j"};
-  std::string first;
-  for (const char* threads : {"1", "2", "5"}) {
-    std::vector<std::string> all = options;
-    all.emplace_back(threads);
-    const std::string bytes = read_file(draw(all, {}, "a.png"));
-    if (first.empty()) first = bytes;
-    EXPECT_TRUE(bytes == first) << threads;
-  }
-}
-
-TEST_F(ShadeCommand, VoidsAreTransparent) {
-  const Channel alpha = read_channel(draw({"--size", "200x120"}), "3");
-  EXPECT_EQ(alpha.at(5, 5), 0);
-  EXPECT_EQ(alpha.at(60, 60), 255);
-}
-
 // The picture of a ramp under a western sun is the mirror image of its mirror image under an eastern one: a picture
 // that lay half a pixel off would be a pixel off, 5 of 255 grey levels here. --fit: colours are spread over all of the
 // tiles.

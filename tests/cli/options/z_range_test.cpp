@@ -126,13 +126,5 @@ TEST_F(ZRange, AStepMustDivideTheRange) {
   EXPECT_EQ(convert({"--z-range=-7:901", "--step", "4"}).exit_code, 0);
 }
 
-TEST_F(ZRange, AResumedJobKeepsTheRange) {
-  const RunResult other = convert({"--z-range=-7:900", "--resume"});
-  EXPECT_EQ(other.exit_code, 0) << other.err;
-  const std::string whole = read_file(folder / "a.isohf");
-  EXPECT_EQ(convert({"--z-range=-7:900", "--threads", "1"}).exit_code, 0);
-  EXPECT_EQ(read_file(folder / "a.isohf"), whole);
-}
-
 }  // namespace
 }  // namespace isohf::test
