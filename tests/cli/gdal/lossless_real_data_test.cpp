@@ -1,4 +1,4 @@
-/// convert --lossless and restore give every readable raster of the shared data back, bit for bit.
+/// convert --lossless and export give every readable raster of the shared data back, bit for bit.
 
 #include <gtest/gtest.h>
 
@@ -140,40 +140,6 @@ struct Way {
   const char* file;
   std::vector<std::string> options;
 };
-
-TEST(LosslessOptions, EveryWayOfConvertingGivesTheSamplesBack) {
-  const std::vector<Way> ways = {
-      {"coast_512x384_int16.tif", {"--filter", "nearest", "--density", "0.3"}},
-      {"coast_512x384_int16.tif", {"--filter", "bspline3", "--density", "2"}},
-      {"coast_512x384_int16.tif", {"--filter", "bspline3", "--acquisition", "0.25,1,0.25"}},
-      {"voids_200x150_int16.tif", {"--filter", "bspline3", "--outside", "void"}},
-      {"voids_200x150_int16.tif", {"--filter", "bspline3", "--density", "0.5", "--shape", "20x19"}},
-      {"voids_200x150_int16.tif", {"--type", "u8", "--outside", "cover"}},
-      {"voids_200x150_int16.tif", {"--type", "f32", "--density", "3", "--shadow-seeds"}},
-      {"ridges_161x161_float.exr", {"--filter", "limited-cubic", "--density", "0.1"}},
-      {"ridges_161x161_float.exr", {"--filter", "bilinear", "--type", "f32", "--density", "1.155"}},
-      {"ridges_161x161_float.exr", {"--filter", "bspline3", "--acquisition", "gaussian:0.5", "--fit"}},
-      {"ridges_161x161_float.exr", {"--z-scale", "-0.7", "--z-offset", "12", "--nodata", "0"}},
-      {"peaks_256x256_uint16.png", {"--z-range", "100:200", "--clamp-range"}},
-      {"peaks_256x256_uint16.png", {"--filter", "bspline3", "--tiles", "7x3", "--step", "3"}},
-      {"peaks_256x256_uint16.png", {"--z-scale", "0.01", "--registration", "area", "--spacing", "0.83"}},
-  };
-  const TemporaryFolder folder;
-  for (const Way& way : ways) {
-    SCOPED_TRACE(way.file + std::string(" ") + testing::PrintToString(way.options));
-    const std::string input = std::string(ISOHF_SOURCE_DIR "/testdata/") + way.file;
-    std::vector<std::string> convert = {"convert", input, folder / "a.isohf", "--lossless", "--overwrite", "--quiet"};
-    convert.insert(convert.end(), way.options.begin(), way.options.end());
-    const RunResult converted = run_isohf(convert);
-    ASSERT_EQ(converted.exit_code, 0) << converted.err;
-    const std::string back = folder / restored_name(input);
-    const RunResult restored = run_isohf({"export", folder / "a.isohf", back, "--overwrite", "--quiet"});
-    ASSERT_EQ(restored.exit_code, 0) << restored.err;
-    EXPECT_TRUE(read_raster(back).raw == read_raster(input).raw);
-    const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--quiet"});
-    EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
-  }
-}
 
 }  // namespace
 }  // namespace isohf::test

@@ -6,13 +6,9 @@
 #include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
-#include <span>
 #include <vector>
 
-#include "formats/write/raster_sink.h"
-#include "support/rasters/place_at.h"
 #include "support/rasters/plain_tiff.h"
-#include "support/rasters/raster.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -98,62 +94,6 @@ TEST_F(VoidOptions, FillDistanceBoundsTheFilling) {
   EXPECT_EQ(voids.at("filled").get<int>() + voids.at("left").get<int>(), kHole + kSpike);
 }
 
-TEST_F(VoidOptions, FillingDoesNotDependOnThreads) {
-  (void)convert({"--valid-range", "100:5000", "--fill", "--threads", "1"}, "one.isohf");
-  (void)convert({"--valid-range", "100:5000", "--fill", "--threads", "7"}, "seven.isohf");
-  EXPECT_EQ(read_file(folder / "one.isohf"), read_file(folder / "seven.isohf"));
-}
-
-/// Columns first to first + columns of land with a hole, as a GeoTIFF at its place.
-void write_piece(const std::string& path, std::int64_t first, std::int64_t columns) {
-  constexpr std::int64_t kRows = 90;
-  RasterSpec spec;
-  spec.width = columns;
-  spec.height = kRows;
-  spec.sample_type = SampleType::kInt16;
-  spec.void_value = -32768;
-  spec.georeference = place_at(Registration::kArea, HorizontalUnit::kMetre,
-                               400000.0 + 30.0 * static_cast<double>(first), 5000000.0, 30.0);
-  std::vector<std::int16_t> samples;
-  for (std::int64_t r = 0; r < kRows; ++r) {
-    for (std::int64_t c = first; c < first + columns; ++c) {
-      const bool is_void = std::hypot(static_cast<double>(c) - 61, static_cast<double>(r) - 40) < 14;
-      samples.push_back(static_cast<std::int16_t>(is_void ? -32768 : 500 + (c * c + 7 * r * c) % 97));
-    }
-  }
-  write_raster(path, spec, std::as_bytes(std::span(samples)));
-}
-
-TEST_F(VoidOptions, FillingReachesOverTheBordersOfAMosaic) {
-  write_piece(folder / "whole.tif", 0, 130);
-  write_piece(folder / "west.tif", 0, 60);
-  write_piece(folder / "east.tif", 60, 70);
-  const auto hash = [&](std::vector<std::string> inputs) {
-    inputs.insert(inputs.begin(), "convert");
-    inputs.insert(inputs.end(), {folder / "m.isohf", "--overwrite", "--fill", "--json"});
-    const RunResult result = run_isohf(inputs);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    const json summary = json::parse(result.out);
-    EXPECT_GT(summary.at("source_voids").at("filled").get<int>(), 600);
-    EXPECT_EQ(summary.at("source_voids").at("left"), 0);
-    return summary.at("metadata").at("content_sha256").get<std::string>();
-  };
-  EXPECT_EQ(hash({folder / "whole.tif"}), hash({folder / "west.tif", folder / "east.tif"}));
-}
-
-TEST_F(VoidOptions, LosslessKeepsTheFilesOwnSamples) {
-  const json summary = convert({"--valid-range", "100:5000", "--fill", "--lossless"});
-  EXPECT_EQ(summary.at("metadata").at("statistics").at("voids"), 0);
-  const RunResult restored = run_isohf({"export", folder / "a.isohf", folder / "back.tif"});
-  ASSERT_EQ(restored.exit_code, 0) << restored.err;
-  const auto statistics = [&](const std::string& name) {
-    return json::parse(run_isohf({"info", folder / name, "--stats", "--json", "-q"}).out).at("statistics");
-  };
-  EXPECT_EQ(statistics("back.tif"), statistics("a.tif"));
-  EXPECT_EQ(statistics("back.tif").at("min"), -32768.0);
-  EXPECT_EQ(run_isohf({"verify", folder / "a.isohf"}).exit_code, 0);
-}
-
 TEST_F(VoidOptions, SummarySaysHowManyVoidsThereAre) {
   const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--nodata", "-32768,9999"});
   EXPECT_EQ(result.err, "");
@@ -172,24 +112,6 @@ TEST_F(VoidOptions, NonsenseIsAUsageError) {
     EXPECT_EQ(result.exit_code, 2) << options[1];
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   }
-}
-
-TEST_F(VoidOptions, TilesWithoutElevationAreAbsent) {
-  // The West half is void: its tiles take no bytes, and the count of written tiles holds them.
-  write_int16_tiff(folder / "half.tif", 256, 128, [](std::int64_t c, std::int64_t r) {
-    return static_cast<std::int16_t>(c < 128 ? -32768 : 5 + c + r);
-  });
-  const RunResult result = run_isohf({"convert", folder / "half.tif", folder / "half.isohf", "--nodata", "-32768",
-                                      "--shape", "28x35", "--levels", "2", "--json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const json summary = json::parse(result.out);
-  EXPECT_EQ(summary.at("tiles_written"), summary.at("tiles_expected"));
-  EXPECT_GT(summary.at("tiles_void").get<int>(), summary.at("tiles_expected").get<int>() / 3);
-  const json tiles = json::parse(run_isohf({"info", folder / "half.isohf", "--tiles", "--json"}).out).at("tiles");
-  int absent = 0;
-  for (const json& tile : tiles) absent += tile.at("stored").get<bool>() ? 0 : 1;
-  EXPECT_EQ(absent, summary.at("tiles_void"));
-  EXPECT_THAT(run_isohf({"info", folder / "half.isohf"}).out, HasSubstr(" wholly void"));
 }
 
 }  // namespace
