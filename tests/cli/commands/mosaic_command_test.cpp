@@ -9,10 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/mosaic/mosaic_pieces.h"
-#include "isohf/raster.h"
 #include "support/altered_archive.h"
 #include "support/rasters/plain_tiff.h"
-#include "support/real_files.h"
 #include "support/run_program.h"
 #include "support/sanitizers.h"
 #include "support/temporary_folder.h"
@@ -147,19 +145,6 @@ TEST_F(MosaicCommand, TheArchiveSaysWhatItWasJoinedFrom) {
   EXPECT_EQ(verified.err, "");
 }
 
-TEST_F(MosaicCommand, RestoringALosslessMosaicGivesTheWholeRaster) {
-  const CutRaster raster = hills(placed_spec(190, 140, SampleType::kInt16, Registration::kArea));
-  convert(write_pieces(raster, folder / "", ragged_cut(190, 140, 6, 12)), {"--lossless"});
-  const RunResult result = run_isohf({"export", folder / "out.isohf", folder / "back.tif"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto back = open_raster(folder / "back.tif", {});
-  ASSERT_EQ(back->info().width, 190);
-  EXPECT_EQ(back->info().georeference.origin_x, raster.spec.georeference->origin_x);
-  std::vector<std::byte> samples(raster.samples.size());
-  back->read_window({0, 0, 190, 140}, samples);
-  EXPECT_TRUE(samples == raster.samples);
-}
-
 TEST_F(MosaicCommand, DegreeTilesWithSharedPostsGiveTheSurfaceOfTheWhole) {
   CutRaster raster = hills(placed_spec(241, 121, SampleType::kInt16, Registration::kPoint, true));
   raster.spec.georeference->spacing_x = raster.spec.georeference->spacing_y = 1.0 / 60.0;
@@ -249,43 +234,6 @@ TEST_F(MosaicCommand, WhatIsNotThereOrTwiceThereIsNamed) {
   EXPECT_EQ(folder.names(), (Words{"blank.txt", "empty", "list.txt", "piece0.tif", "piece1.tif", "piece2.tif"}));
 }
 
-TEST_F(MosaicCommand, VerifyTakesTheOverlapRuleFromTheArchive) {
-  CutRaster raster = hills(placed_spec(120, 60, SampleType::kInt16, Registration::kArea));
-  const std::string tiles = subfolder("tiles");
-  raster.cut(tiles + "a.tif", {0, 0, 80, 60});
-  for (std::byte& byte : raster.samples) byte ^= std::byte{0x10};  // other elevations in the overlap
-  raster.cut(tiles + "b.tif", {60, 0, 60, 60});
-  const std::string first = convert({tiles}, {"--overlap", "first"});
-  EXPECT_EQ(metadata().at("source").at("mosaic").at("overlap"), "first");
-  EXPECT_EQ(run_isohf({"verify", folder / "out.isohf", "--against", tiles}).exit_code, 0);
-  EXPECT_FALSE(first == convert({tiles}, {}));
-}
-
-TEST_F(MosaicCommand, ABoxOfPiecesIsThatOfTheWhole) {
-  const CutRaster raster = hills(placed_spec(190, 140, SampleType::kInt16, Registration::kArea));
-  raster.cut(folder / "whole.tif", {0, 0, 190, 140});
-  raster.cut(folder / "part.tif", {30, 20, 100, 80});
-  const std::string pieces = subfolder("pieces");
-  write_pieces(raster, pieces, regular_cut(190, 140, 45));
-  std::filesystem::remove(pieces + "piece4.tif");  // in the North-East, outside the box
-  const Words options = {"--shape", "52x67"};
-  Words in_box = options;
-  in_box.insert(in_box.end(), {"--bbox", "500900,5197015,503900,5199415"});
-  // The archives only differ in the box that they record.
-  const auto content = [&](const std::string& input, const Words& with) {
-    (void)convert({input}, with);
-    return metadata().at("content_sha256").get<std::string>();
-  };
-  const std::string part = content(folder / "part.tif", options);
-  EXPECT_EQ(content(folder / "whole.tif", in_box), part);
-  in_box.emplace_back("--strict");
-  EXPECT_EQ(content(pieces, in_box), part);
-  EXPECT_EQ(metadata().at("source").at("width"), 100);
-  const RunResult verified = run_isohf({"verify", folder / "out.isohf", "--against", pieces});
-  EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
-  EXPECT_EQ(run_isohf({"convert", folder / "whole.tif", folder / "x.isohf", "--bbox", "1,2,3,4"}).exit_code, 2);
-}
-
 TEST_F(MosaicCommand, FourHundredFilesGoThroughFewHandles) {
   const CutRaster raster = hills(placed_spec(200, 200, SampleType::kInt16, Registration::kPoint));
   raster.cut(folder / "whole.tif", {0, 0, 200, 200});
@@ -346,48 +294,6 @@ TEST_F(MosaicCommand, ResumeRefusesOtherMembers) {
   EXPECT_NE(run_program(other).exit_code, 0);
   const RunResult same = run_program(resume);
   EXPECT_EQ(same.exit_code, 0) << same.err;
-}
-
-TEST_F(MosaicCommand, ARealRasterInPiecesHasNoSeam) {
-  const std::string path = real_data() / "srtm_bigtujunga30m_utm11.tif";
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << kNoRealFiles;
-  const auto source = open_raster(path, {});
-  const SourceInfo& info = source->info();
-  CutRaster raster;
-  raster.spec = placed_spec(info.width, info.height, info.sample_type, info.georeference.registration);
-  raster.spec.georeference = info.georeference;
-  raster.spec.vertical_unit = info.vertical_unit;
-  if (!info.void_values.empty()) raster.spec.void_value = info.void_values.front();
-  raster.samples.resize(static_cast<std::size_t>(info.width * info.height) * size_bytes(info.sample_type));
-  source->read_window({0, 0, info.width, info.height}, raster.samples);
-  raster.cut(folder / "whole.tif", {0, 0, info.width, info.height});
-  const std::string pieces = subfolder("pieces");
-  write_pieces(raster, pieces, ragged_cut(info.width, info.height, 9, 25));
-  const Words options = {"--filter", "bspline3", "--shadow-seeds", "--lossless"};
-  EXPECT_TRUE(members({folder / "whole.tif"}, options) == members({pieces}, options));
-}
-
-TEST_F(MosaicCommand, RealDegreeTilesJoin) {
-  const std::string data = real_data().string() + "/";
-  if (!std::filesystem::exists(data + "N44E006.hgt")) GTEST_SKIP() << kNoRealFiles;
-  convert({data + "N44E007.hgt", data + "N44E006.hgt"}, {"--lossless"});
-  const auto west = open_raster(data + "N44E006.hgt", {});
-  const auto east = open_raster(data + "N44E007.hgt", {});
-  const std::int64_t side = west->info().width;
-  EXPECT_EQ(metadata().at("source").at("width"), 2 * side - 1);
-  EXPECT_EQ(metadata().at("source").at("crs").at("origin_x"), 6.0);
-  ASSERT_EQ(run_isohf({"export", folder / "out.isohf", folder / "back.tif", "-q"}).exit_code, 0);
-  const auto back = open_raster(folder / "back.tif", {});
-  const auto rows = static_cast<std::size_t>(side * side * 2);
-  std::vector<std::byte> expected(rows);
-  std::vector<std::byte> found(rows);
-  east->read_window({1, 0, side - 1, side}, std::span(expected).first(static_cast<std::size_t>((side - 1) * side * 2)));
-  back->read_window({side, 0, side - 1, side}, std::span(found).first(static_cast<std::size_t>((side - 1) * side * 2)));
-  EXPECT_TRUE(found == expected);
-  // The shared column is that of the last input, N44E006.
-  west->read_window({0, 0, side, side}, expected);
-  back->read_window({0, 0, side, side}, found);
-  EXPECT_TRUE(found == expected);
 }
 
 }  // namespace

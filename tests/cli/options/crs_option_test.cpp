@@ -178,30 +178,5 @@ TEST_F(CrsOption, ExportToTheArchivesOwnDegreesAddsNoBorderHoweverTheyAreSpelled
   }
 }
 
-TEST_F(CrsOption, MapsThatDifferInOneParameterNeverJoin) {
-  const auto prj = [](const char* latitude) {
-    return std::string("Projection TRANSVERSE\nDatum WGS84\nUnits METERS\nParameters\n0.9996\n9 0 0\n") + latitude +
-           "\n500000\n0\n";
-  };
-  write_text(folder_ / "west.asc", small_grid());
-  std::string east = small_grid(1);
-  east.replace(east.find("xllcorner 0"), 11, "xllcorner 1200");
-  write_text(folder_ / "east.asc", east);
-  write_text(folder_ / "west.prj", prj("0 0 0"));
-  write_text(folder_ / "east.prj", prj("0 0 1"));
-  const Words join = {"convert", folder_ / "west.asc", folder_ / "east.asc", "-o", archive_, "--quiet", "--overwrite"};
-  const RunResult apart = run_isohf(join);
-  EXPECT_NE(apart.exit_code, 0);
-  EXPECT_THAT(apart.err, HasSubstr("reference system"));
-  ASSERT_EQ(run_isohf({"convert", folder_ / "west.asc", archive_, "--quiet"}).exit_code, 0);
-  const RunResult like =
-      run_isohf({"export", archive_, folder_ / "like.tif", "--like", folder_ / "east.asc", "--quiet"});
-  EXPECT_NE(like.exit_code, 0);
-  EXPECT_THAT(like.err, HasSubstr("bring it to that"));
-  // The same map in other words joins.
-  write_text(folder_ / "east.prj", "Projection UTM\nZone 32\nDatum WGS84\nUnits METERS\n");
-  EXPECT_EQ(run_isohf(join).err, "");
-}
-
 }  // namespace
 }  // namespace isohf::test
