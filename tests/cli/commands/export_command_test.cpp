@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -97,33 +96,6 @@ TEST_F(ExportCommand, LevelGroundIsOneNumber) {
     EXPECT_EQ(*std::max_element(codes.elevations.begin(), codes.elevations.end()),
               *std::min_element(codes.elevations.begin(), codes.elevations.end()));
     EXPECT_NEAR(said.at("z_offset").get<double>() + codes.elevations.front(), 100.1, 1e-4);
-  }
-}
-
-TEST_F(ExportCommand, WritesTheSamePlaceAndElevationsInEveryFormat) {
-  const json first = exported({folder_ / "a.tif", "--method", "hex"});
-  EXPECT_EQ(first.at("width"), 512);
-  EXPECT_EQ(first.at("sample_type"), "float32");
-  const Raster tif = read_raster(folder_ / "a.tif");
-  EXPECT_EQ(tif.info.sample_type, SampleType::kFloat32);
-  EXPECT_EQ(tif.info.block_width, 256);
-  for (const std::string name : {"b.exr", "b.flt", "c.asc", "d.r16", "e.r32", "f.npy", "g.png"}) {
-    SCOPED_TRACE(name);
-    const json summary = exported({folder_ / name, "--method", "hex"});
-    const Raster raster = read_raster(folder_ / name);
-    ASSERT_EQ(raster.info.width, tif.info.width);
-    ASSERT_EQ(raster.info.height, tif.info.height);
-    const bool whole_numbers = name == "d.r16" || name == "g.png";
-    // Half a step, and the rounding of floats of up to a few thousand metres.
-    const double tolerance = whole_numbers ? 0.5 * summary.at("z_scale").get<double>() + 3e-4 : 0.0;
-    for (std::size_t i = 0; i < tif.elevations.size(); ++i) {
-      ASSERT_NEAR(raster.elevations[i], tif.elevations[i], tolerance) << i;
-    }
-    if (name == "b.exr" || name == "f.npy") continue;
-    EXPECT_EQ(raster.info.georeference.has_origin, tif.info.georeference.has_origin);
-    EXPECT_DOUBLE_EQ(raster.info.georeference.origin_x, tif.info.georeference.origin_x);
-    EXPECT_DOUBLE_EQ(raster.info.georeference.origin_y, tif.info.georeference.origin_y);
-    EXPECT_EQ(raster.info.georeference.spacing_x, tif.info.georeference.spacing_x);
   }
 }
 

@@ -93,21 +93,6 @@ TEST_F(ExportAsSource, MoreThreadsThanCoresAreNoWordOnStandardError) {
   }
 }
 
-TEST_F(ExportAsSource, KeepsThePlaceTypeAndReferenceSystemOfTheSource) {
-  convert(kCoast);
-  const Raster source = read_raster(kCoast);
-  const Raster back = exported("back.tif");
-  EXPECT_EQ(back.info.sample_type, source.info.sample_type);
-  EXPECT_EQ(back.info.vertical_unit, source.info.vertical_unit);
-  const Georeference& place = back.info.georeference;
-  EXPECT_EQ(place.has_origin, source.info.georeference.has_origin);
-  EXPECT_EQ(place.registration, source.info.georeference.registration);
-  EXPECT_EQ(place.origin_x, source.info.georeference.origin_x);
-  EXPECT_EQ(place.origin_y, source.info.georeference.origin_y);
-  EXPECT_EQ(place.spacing_x, source.info.georeference.spacing_x);
-  EXPECT_EQ(place.system.epsg, source.info.georeference.system.epsg);
-}
-
 /// Restoring by splines undoes more of the resampling than the triangles do.
 TEST_F(ExportAsSource, HexIsNearerToTheSourceThanTheTriangles) {
   convert(kRidges, {"--filter", "bspline3", "--type", "f32"});
@@ -396,18 +381,6 @@ TEST_F(ExportAsSource, SaysWhatAFormatHasNoPlaceFor) {
   EXPECT_THAT(hgt.err, HasSubstr("has no place for the unit of its elevations, foot"));
   EXPECT_THAT(hgt.err, HasSubstr("readers take it for degrees of WGS 84, which its samples do not lie on"));
   for (const char* output : {"back.tif", "back.png", "back.exr"}) EXPECT_EQ(run(output, {"-q"}).err, "") << output;
-}
-
-TEST_F(ExportAsSource, FullDiskLeavesNothing) {
-  convert(kPeaks, {"--lossless"});
-  RunOptions full;
-  full.file_size_limit_bytes = 20000;
-  for (const char* name : {"back.tif", "back.exr", "back.png"}) {
-    expect_refused(run(name, {}, full), 1, std::string(name) + ": ");
-    expect_refused(run(name, {"--method", "hex"}, full), 1, std::string(name) + ": ");
-  }
-  expect_refused(run("back.hgt", {"--size", "1201x1201", "--clamp-range"}, full), 1, "back.hgt: ");
-  EXPECT_EQ(folder.names(), std::vector<std::string>{"a.isohf"});
 }
 
 /// Changes one byte in the middle of a member's compressed bytes.

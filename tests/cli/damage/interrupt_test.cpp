@@ -56,19 +56,6 @@ TEST_F(Interrupt, SigintIsExit130AndResumingGivesTheSameBytes) {
   EXPECT_EQ(folder.names(), (std::vector<std::string>{"big.isohf", "big.tif", "straight.isohf"}));
 }
 
-/// Tiles of two efforts in one archive would not be the bytes of either.
-TEST_F(Interrupt, ResumingWithAnotherEffortIsRefusedAndHarmsNothing) {
-  ASSERT_EQ(stopped_by(SIGINT).exit_code, 130);
-  const RunResult other = run_program(command("big.isohf", {"--resume", "--effort", "best"}));
-  EXPECT_EQ(other.exit_code, 2);
-  EXPECT_THAT(other.err, testing::HasSubstr("big.isohf.part"));
-  EXPECT_FALSE(exists("big.isohf"));
-  const RunResult resumed = run_program(command("big.isohf", {"--resume"}));
-  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
-  const RunResult straight = run_program(command("straight.isohf"));
-  EXPECT_TRUE(read_file(folder / "big.isohf") == read_file(folder / "straight.isohf"));
-}
-
 TEST_F(Interrupt, SigtermIsExit130) {
   EXPECT_EQ(stopped_by(SIGTERM).exit_code, 130);
   EXPECT_FALSE(exists("big.isohf"));
