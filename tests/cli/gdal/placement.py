@@ -7,7 +7,6 @@ Heights are metres to the East of a place, or to the North of it, so that a heig
 """
 import json
 import math
-import os
 import subprocess
 import sys
 
@@ -281,21 +280,6 @@ def written_elsewhere(isohf, folder):
     isohf.refuses("hex", "export", folder / "o.isohf", folder / "n.tif", "--crs", "EPSG:3857", "--method", "hex")
     isohf.refuses("does not understand", "export", folder / "o.isohf", folder / "n.tif", "--crs", "EPSG:999999")
     isohf.refuses("degrees", "export", folder / "o.isohf", folder / "n.tif", "--crs", "EPSG:4326", "--spacing", "30m")
-
-
-def loads_no_proj(isohf, folder):
-    """What reads and says nothing of maps loads no PROJ: .hgt, degrees, UTM zones and archives of these."""
-    rows = numpy.zeros((1201, 1201), dtype=">i2")
-    (folder / "N46E009.hgt").write_bytes(rows.tobytes())
-    write(folder / "utm.tif", "EPSG:32632", 9.0, 46.0, 30.0, (9.0, 46.0), 0)
-    isohf.must("convert", folder / "N46E009.hgt", "-o", folder / "h.isohf", "--overwrite", "-q")
-    isohf.must("convert", folder / "utm.tif", "-o", folder / "u.isohf", "--overwrite", "-q")
-    for path in ("N46E009.hgt", "h.isohf", "utm.tif", "u.isohf"):
-        environment = dict(os.environ, LD_DEBUG="files")
-        result = subprocess.run([f"{isohf.bin}/isohf", "info", str(folder / path)], env=environment, capture_output=True,
-                                text=True, check=False)
-        check(result.returncode == 0 and "calling init" in result.stderr and "libproj" not in result.stderr
-              and "isohf_proj" not in result.stderr, f"info {path} loads PROJ")
 
 
 def beside(isohf, folder):
@@ -622,7 +606,7 @@ made.Write(numpy.zeros((12000, 12000), dtype=numpy.float32))
 """
 
 
-PARTS = (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, loads_no_proj, beside,
+PARTS = (projections, globes, planets, heights_of_a_projection, joined, other_parameters, written_elsewhere, beside,
          samples, turns, same_for_gdal, bounds_of_labels, pages, numbers_of_no_unit, ellipsoidal, large_chunks, feet, voids_of_files, beside_samples, rotated)
 
 if __name__ == "__main__":

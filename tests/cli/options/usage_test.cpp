@@ -110,6 +110,8 @@ TEST(Usage, BashCompletesCommandsAndOptions) {
   EXPECT_EQ(completions_of(" --config my.toml co", 3), "convert\n");
   EXPECT_EQ(completions_of(" help co", 2), "convert\n");
   EXPECT_EQ(completions_of(" view --mode t", 3), "texture\n");
+  EXPECT_EQ(completions_of(" convert --filter bs", 3), "bspline3\n");
+  EXPECT_EQ(completions_of(" info " ISOHF_SOURCE_DIR "/READ", 2), ISOHF_SOURCE_DIR "/README.md\n");
 }
 
 TEST(Usage, BashCompletesEveryCommandOptionAndWord) {
