@@ -99,52 +99,33 @@ TEST_F(ExportCommand, LevelGroundIsOneNumber) {
   }
 }
 
-TEST_F(ExportCommand, IsReadByGdalWithTheSamePlaceAndElevations) {
+TEST_F(ExportCommand, IsReadByGdalWithTheSameElevationsAndVoids) {
   if (run_program({"/bin/sh", "-c", "command -v gdal_translate gdalinfo"}).exit_code != 0)
     GTEST_SKIP() << "gdal-bin is not installed";
   ASSERT_EQ(run_isohf({"convert", kVoids, folder_ / "voids.isohf", "-q"}).exit_code, 0);
-  int checked = 0;
-  for (const std::string archive : {"coast.isohf", "voids.isohf"}) {
-    for (const std::vector<std::string>& options :
-         {std::vector<std::string>{"--method", "hex"}, {"--size", "300x200"}}) {
-      for (const std::string extension : {".tif", ".flt", ".asc", ".png"}) {
-        const std::string name = "g" + std::to_string(++checked) + extension;
-        SCOPED_TRACE(archive + " " + name);
-        std::vector<std::string> arguments = {folder_ / name};
-        arguments.insert(arguments.end(), options.begin(), options.end());
-        const json summary = exported(arguments, archive);
-        const std::string raw = folder_ / (name + ".img");
-        const RunResult translated = run_program({"/usr/bin/env", "GDAL_PAM_ENABLED=NO", "gdal_translate", "-q", "-of",
-                                                  "ENVI", "-ot", "Float64", folder_ / name, raw});
-        ASSERT_EQ(translated.exit_code, 0) << translated.err;
-        const auto told =
-            json::parse(run_program({"/usr/bin/env", "GDAL_PAM_ENABLED=NO", "gdalinfo", "-json", folder_ / name}).out);
-        const Raster ours = extension == ".png" ? read_codes(folder_ / name) : read_raster(folder_ / name);
-        ASSERT_EQ(told.at("size").at(0), ours.info.width);
-        ASSERT_EQ(told.at("size").at(1), ours.info.height);
-        std::vector<double> theirs(ours.elevations.size());
-        std::ifstream in(raw, std::ios::binary);
-        in.read(reinterpret_cast<char*>(theirs.data()), static_cast<std::streamsize>(theirs.size() * sizeof(double)));
-        ASSERT_EQ(in.gcount(), static_cast<std::streamsize>(theirs.size() * sizeof(double)));
-        const json& band = told.at("bands").at(0);
-        for (std::size_t i = 0; i < theirs.size(); ++i) {
-          if (std::isnan(ours.elevations[i])) {
-            const bool is_void = std::isnan(theirs[i]) || theirs[i] < -1e38 ||
-                                 (band.contains("noDataValue") && band.at("noDataValue").get<double>() == theirs[i]);
-            ASSERT_TRUE(is_void) << i << " " << theirs[i];
-          } else {
-            ASSERT_EQ(static_cast<float>(theirs[i]), static_cast<float>(ours.elevations[i])) << i;
-          }
-        }
-        if (extension == ".png") continue;
-        const Georeference& place = ours.info.georeference;
-        ASSERT_TRUE(place.has_origin);
-        const json& transform = told.at("geoTransform");
-        EXPECT_NEAR(transform.at(0).get<double>() + place.spacing_x / 2.0, place.origin_x,
-                    1e-9 * std::abs(place.origin_x));
-        EXPECT_NEAR(transform.at(3).get<double>() - place.spacing_y / 2.0, place.origin_y,
-                    1e-9 * std::abs(place.origin_y));
-        EXPECT_NEAR(transform.at(1).get<double>(), place.spacing_x, 1e-12 * place.spacing_x);
+  for (const std::string name : {"g.tif", "g.flt", "g.asc", "g.png"}) {
+    SCOPED_TRACE(name);
+    (void)exported({folder_ / name, "--method", "hex"}, "voids.isohf");
+    const std::string raw = folder_ / (name + ".img");
+    const RunResult translated = run_program({"/usr/bin/env", "GDAL_PAM_ENABLED=NO", "gdal_translate", "-q", "-of",
+                                              "ENVI", "-ot", "Float64", folder_ / name, raw});
+    ASSERT_EQ(translated.exit_code, 0) << translated.err;
+    const auto told =
+        json::parse(run_program({"/usr/bin/env", "GDAL_PAM_ENABLED=NO", "gdalinfo", "-json", folder_ / name}).out);
+    const Raster ours = name == "g.png" ? read_codes(folder_ / name) : read_raster(folder_ / name);
+    ASSERT_EQ(told.at("size"), json({ours.info.width, ours.info.height}));
+    std::vector<double> theirs(ours.elevations.size());
+    std::ifstream in(raw, std::ios::binary);
+    in.read(reinterpret_cast<char*>(theirs.data()), static_cast<std::streamsize>(theirs.size() * sizeof(double)));
+    ASSERT_EQ(in.gcount(), static_cast<std::streamsize>(theirs.size() * sizeof(double)));
+    const json& band = told.at("bands").at(0);
+    for (std::size_t i = 0; i < theirs.size(); ++i) {
+      if (std::isnan(ours.elevations[i])) {
+        const bool is_void = std::isnan(theirs[i]) || theirs[i] < -1e38 ||
+                             (band.contains("noDataValue") && band.at("noDataValue").get<double>() == theirs[i]);
+        ASSERT_TRUE(is_void) << i << " " << theirs[i];
+      } else {
+        ASSERT_EQ(static_cast<float>(theirs[i]), ours.elevations[i]) << i;
       }
     }
   }
@@ -255,9 +236,6 @@ TEST_F(ExportCommand, RefusesTilesThatDoNotComeOutWhole) {
   EXPECT_THAT(refused({out, "--tile-size", "4", "--overlap", "3"}), HasSubstr("at least twice the overlap"));
   EXPECT_THAT(refused({out, "--overlap", "1"}), HasSubstr("--overlap needs --tile-size"));
   EXPECT_THAT(refused({out, "--bbox", "1,2,1,3"}), HasSubstr("must be WEST,SOUTH,EAST,NORTH"));
-  EXPECT_THAT(refused({out, "--bbox", "-9e9,-9e9,-8e9,-8e9"}), HasSubstr("--bbox lies outside"));
-  EXPECT_THAT(refused({folder_ / "t.hgt"}), HasSubstr("an HGT tile has 1201 x 1201"));
-  EXPECT_THAT(refused({folder_ / "t.jpg"}), HasSubstr("no writer for the extension"));
 }
 
 TEST_F(ExportCommand, LeavesNothingWhereTheDiskIsFullOrAFileIsThere) {

@@ -12,12 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "formats/registry.h"
-#include "formats/write/raster_sink.h"
-#include "isohf/base/sample.h"
-#include "isohf/raster.h"
 #include "support/rasters/degree_grid.h"
-#include "support/rasters/samples.h"
+#include "support/rasters/raster.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -36,19 +32,6 @@ const std::vector<std::string> kWarpedKinds = {"local",
 
 double land(double longitude, double latitude) {
   return 800.0 + 400.0 * std::sin(0.7 * longitude) * std::cos(0.8 * latitude);
-}
-
-struct Raster {
-  SourceInfo info;
-  std::vector<float> heights;  ///< NaN where void
-};
-
-Raster read_raster(const std::string& path) {
-  const auto source = open_raster(path, {});
-  Raster raster{source->info(), {}};
-  raster.heights.resize(static_cast<std::size_t>(raster.info.width * raster.info.height));
-  heights_from_samples(raster.info, 0.0, read_whole(*source), raster.heights);
-  return raster;
 }
 
 class ExportLike : public testing::Test {
@@ -125,17 +108,19 @@ TEST_F(ExportLike, ErrsAtTheSourcesSamplesByWhatVerifyMeasures) {
     ASSERT_EQ(verified.exit_code, 0) << verified.err;
     const json against = json::parse(verified.out).at("against");
     const Raster back = like("wide.flt");
-    ASSERT_EQ(back.heights.size(), source.heights.size());
+    ASSERT_EQ(back.elevations.size(), source.elevations.size());
     double worst = 0.0;
     double squares = 0.0;
-    for (std::size_t i = 0; i < back.heights.size(); ++i) {
-      const double error = std::abs(static_cast<double>(back.heights[i]) - static_cast<double>(source.heights[i]));
+    for (std::size_t i = 0; i < back.elevations.size(); ++i) {
+      const double error =
+          std::abs(static_cast<double>(back.elevations[i]) - static_cast<double>(source.elevations[i]));
       worst = error <= worst ? worst : error;  // a NaN becomes the worst, and stays
       squares += error * error;
     }
     // Floats of 1200 are rounded by up to 0.00006.
     EXPECT_NEAR(worst, against.at("max").get<double>(), 1e-4);
-    EXPECT_NEAR(std::sqrt(squares / static_cast<double>(source.heights.size())), against.at("rms").get<double>(), 1e-4);
+    EXPECT_NEAR(std::sqrt(squares / static_cast<double>(source.elevations.size())), against.at("rms").get<double>(),
+                1e-4);
     // Triangles of 4 km on waves of 500 a square degree: 0.05 * 0.05 * 500 / 8 is 0.16.
     EXPECT_LT(worst, 0.6);
     EXPECT_EQ(back.info.georeference.unit, HorizontalUnit::kDegree);
@@ -163,7 +148,7 @@ TEST_F(ExportLike, GivesWhatSampleFindsAtFinerCoarserAndShiftedGrids) {
       const Raster found = like(name);
       const SourceInfo info = read_raster(folder / name).info;
       std::vector<float> expected = sampled(info);
-      ASSERT_EQ(found.heights.size(), expected.size());
+      ASSERT_EQ(found.elevations.size(), expected.size());
       std::size_t voids = 0;
       for (std::size_t i = 0; i < expected.size(); ++i) {
         // Tiles go on beyond the input, and are sampled as they are drawn; rasters end where it does.
@@ -173,11 +158,11 @@ TEST_F(ExportLike, GivesWhatSampleFindsAtFinerCoarserAndShiftedGrids) {
         const double latitude =
             info.georeference.origin_y - static_cast<double>(sample / info.width) * info.georeference.spacing_y;
         if (longitude < 2.0 || longitude > 14.0 || latitude < 42.0 || latitude > 50.0) expected[i] = std::nanf("");
-        ASSERT_EQ(std::isnan(found.heights[i]), std::isnan(expected[i])) << i;
+        ASSERT_EQ(std::isnan(found.elevations[i]), std::isnan(expected[i])) << i;
         voids += std::isnan(expected[i]) ? 1U : 0U;
         // Nine digits are printed, and both are rounded to floats, which lie 0.00012 apart there.
         if (!std::isnan(expected[i])) {
-          ASSERT_NEAR(found.heights[i], expected[i], 2e-4) << i;
+          ASSERT_NEAR(found.elevations[i], expected[i], 2e-4) << i;
         }
       }
       EXPECT_GT(voids, expected.size() / 40);
@@ -212,13 +197,13 @@ TEST_F(ExportLike, HasNothingBeyondAPole) {
   convert("cap.flt", "auto");
   write_degrees(folder / "beyond", 36, 8, 0.0, 84.0, 1.0, land);
   const Raster found = like("beyond.flt");
-  ASSERT_EQ(found.heights.size(), 36U * 8U);
-  for (std::size_t i = 0; i < found.heights.size(); ++i) {
+  ASSERT_EQ(found.elevations.size(), 36U * 8U);
+  for (std::size_t i = 0; i < found.elevations.size(); ++i) {
     const double latitude = 91.5 - static_cast<double>(i / 36);
-    EXPECT_EQ(std::isnan(found.heights[i]), latitude > 90.0) << latitude;
+    EXPECT_EQ(std::isnan(found.elevations[i]), latitude > 90.0) << latitude;
     // A cone, whose slope changes at the pole: flat over a sample of 50 m there.
     if (latitude < 90.0) {
-      EXPECT_NEAR(found.heights[i], 50.0 * (90.0 - latitude), 25.0) << latitude;
+      EXPECT_NEAR(found.elevations[i], 50.0 * (90.0 - latitude), 25.0) << latitude;
     }
   }
 }
@@ -235,12 +220,12 @@ TEST_F(ExportLike, TakesRastersOfTheArchivesOwnMap) {
       const Raster back = like(map, "like.exr");
       ASSERT_EQ(run("direct.exr", {"--size", "128x64", "--overwrite", "-q"}).exit_code, 0);
       const Raster direct = read_raster(folder / "direct.exr");
-      ASSERT_EQ(back.heights.size(), direct.heights.size());
-      for (std::size_t i = 0; i < back.heights.size(); ++i) {
-        ASSERT_EQ(std::isnan(back.heights[i]), std::isnan(direct.heights[i])) << i;
+      ASSERT_EQ(back.elevations.size(), direct.elevations.size());
+      for (std::size_t i = 0; i < back.elevations.size(); ++i) {
+        ASSERT_EQ(std::isnan(back.elevations[i]), std::isnan(direct.elevations[i])) << i;
         // The place is written in 12 digits or more: a tenth of a millimetre, on slopes of less than 1 in 100.
-        if (!std::isnan(direct.heights[i])) {
-          ASSERT_NEAR(back.heights[i], direct.heights[i], 2e-4) << i;
+        if (!std::isnan(direct.elevations[i])) {
+          ASSERT_NEAR(back.elevations[i], direct.elevations[i], 2e-4) << i;
         }
       }
     }
@@ -289,8 +274,9 @@ TEST_F(ExportLike, CountsLongitudesRoundTheBodyWhereRowsStayRows) {
   write_degrees(folder / "plain", 60, 50, 3.0, 43.0, 0.11, land);
   const Raster turned = like("turned.flt", "turned.tif");
   const Raster plain = like("plain.flt", "plain.tif");
-  ASSERT_EQ(turned.heights.size(), plain.heights.size());
-  for (std::size_t i = 0; i < plain.heights.size(); ++i) ASSERT_NEAR(turned.heights[i], plain.heights[i], 1e-3) << i;
+  ASSERT_EQ(turned.elevations.size(), plain.elevations.size());
+  for (std::size_t i = 0; i < plain.elevations.size(); ++i)
+    ASSERT_NEAR(turned.elevations[i], plain.elevations[i], 1e-3) << i;
 }
 
 double hills(double longitude, double latitude) {
@@ -308,10 +294,10 @@ TEST_F(ExportLike, FindsAllColumnsOfAGlobeThatCountsFromTheOtherSide) {
         SCOPED_TRACE(name + " " + method);
         const Raster found = like(name, "like.tif", {"--method", method});
         const Raster expected = read_raster(folder / name);
-        ASSERT_EQ(found.heights.size(), expected.heights.size());
+        ASSERT_EQ(found.elevations.size(), expected.elevations.size());
         EXPECT_DOUBLE_EQ(found.info.georeference.origin_x, expected.info.georeference.origin_x);
-        for (std::size_t i = 0; i < found.heights.size(); ++i)
-          ASSERT_NEAR(found.heights[i], expected.heights[i], 12.0) << i;
+        for (std::size_t i = 0; i < found.elevations.size(); ++i)
+          ASSERT_NEAR(found.elevations[i], expected.elevations[i], 12.0) << i;
       }
     }
   }
@@ -328,8 +314,9 @@ TEST_F(ExportLike, CrsOfTheArchiveItselfGivesTheSourcesGrid) {
     EXPECT_EQ(own.info.height, 160);
     EXPECT_NEAR(own.info.georeference.origin_x, 2.025, 1e-12);
     EXPECT_NEAR(own.info.georeference.spacing_x, 0.05, 1e-12);
-    ASSERT_EQ(own.heights.size(), beside.heights.size());
-    for (std::size_t i = 0; i < own.heights.size(); ++i) ASSERT_NEAR(own.heights[i], beside.heights[i], 1e-3) << i;
+    ASSERT_EQ(own.elevations.size(), beside.elevations.size());
+    for (std::size_t i = 0; i < own.elevations.size(); ++i)
+      ASSERT_NEAR(own.elevations[i], beside.elevations[i], 1e-3) << i;
   }
 }
 
@@ -343,7 +330,8 @@ TEST_F(ExportLike, CrsTakesGroundAcrossThe180thMeridianAndWholeGlobes) {
     return read_raster(folder / "there.tif");
   };
   const auto voids = [](const Raster& raster) {
-    return std::count_if(raster.heights.begin(), raster.heights.end(), [](float height) { return std::isnan(height); });
+    return std::count_if(raster.elevations.begin(), raster.elevations.end(),
+                         [](float height) { return std::isnan(height); });
   };
   EXPECT_NEAR(in_system("EPSG:4326").info.georeference.origin_x, 170.25, 1e-9);
   const Raster other = in_system("EPSG:4258");
@@ -382,10 +370,10 @@ TEST_F(ExportLike, CrsTakesGroundAcrossThe180thMeridianAndWholeGlobes) {
     EXPECT_EQ(place.spacing_x, place.spacing_y) << system;
     EXPECT_LT(std::max(width, height), 2.1 * 20037508.0) << system;
     EXPECT_GT(std::min(width, height), 15e6) << system;
-    EXPECT_LT(voids(polar), static_cast<std::int64_t>(polar.heights.size()) * 8 / 10) << system;
+    EXPECT_LT(voids(polar), static_cast<std::int64_t>(polar.elevations.size()) * 8 / 10) << system;
   }
   const Raster ellipse = in_system("+proj=moll +datum=WGS84");
-  EXPECT_NEAR(static_cast<double>(voids(ellipse)) / static_cast<double>(ellipse.heights.size()), 1.0 - M_PI / 4.0,
+  EXPECT_NEAR(static_cast<double>(voids(ellipse)) / static_cast<double>(ellipse.elevations.size()), 1.0 - M_PI / 4.0,
               0.05);
 }
 
