@@ -104,11 +104,6 @@ TEST_F(ShadeCommand, ExaggerationLengthensShadows) {
   EXPECT_GT(green.at(kWall + 70, 60), green.at(kWall + 20, 60));
 }
 
-TEST_F(ShadeCommand, NoShadowLeavesLevelLandAlike) {
-  const Channel green = read_channel(draw({"--sun-elevation", "10", "--no-shadow", "--size", "200x120"}), "1");
-  EXPECT_EQ(green.at(kWall + 20, 60), green.at(kWall - 20, 60));
-}
-
 /// Ranks of values, ties sharing the mean of theirs, and how two rankings go together: 1 where they are the same.
 double spearman(const std::vector<std::byte>& a, const std::vector<std::byte>& b) {
   const auto ranks = [](const std::vector<std::byte>& values) {

@@ -67,6 +67,7 @@ class ShardsCommand : public testing::Test {
 
 TEST_F(ShardsCommand, MakeTheBytesOfOneRunAndAreNotMadeTwice) {
   make_shards("p-");
+  EXPECT_THAT(run({"info", "p-3.isohf"}).out, HasSubstr("3 of 3, rows "));
   const RunResult again = run(words_of("2/3", "p-2.isohf"));
   EXPECT_EQ(again.exit_code, 0);
   EXPECT_THAT(again.out, HasSubstr("shard 2/3 done already: p-2.isohf, "));
@@ -99,20 +100,6 @@ TEST_F(ShardsCommand, AreRefusedByNumberAndOptions) {
     expect_refused(words_of("1/3", "a.isohf", more), 2, more.front() + " has no place with --shard");
   const RunResult floats = run({"convert", "land.tif", "-o", "a.isohf", "--shard", "1/3", "--type", "f32"});
   EXPECT_EQ(floats.exit_code, 0) << floats.err;
-}
-
-TEST_F(ShardsCommand, AreReadByMergeAndInfoAlone) {
-  make_shards("p-");
-  EXPECT_THAT(run({"info", "p-3.isohf"}).out, HasSubstr("3 of 3, rows "));
-  const std::string why = "p-3.isohf: is shard 3 of 3; merge the shards first: isohf merge ";
-  for (const Words& words : {Words{"verify", "p-3.isohf"},
-                             {"export", "p-3.isohf", "a.tif"},
-                             {"sample", "p-3.isohf", "--at", "1", "1"},
-                             {"shade", "p-3.isohf", "-o", "a.png"},
-                             {"diff", "p-3.isohf", "p-3.isohf"},
-                             {"extract", "p-3.isohf", "-o", "a.isohf", "--tiles", "0:1,0:1"}}) {
-    expect_refused(words, 2, why);
-  }
 }
 
 TEST_F(ShardsCommand, AreJoinedOnlyWithTheirOwnAndNothingIsLost) {

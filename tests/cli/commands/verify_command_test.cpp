@@ -40,10 +40,6 @@ TEST_F(VerifyCommand, FilesAfterTheFirstInputWantAnAgainstOfTheirOwn) {
 }
 
 TEST_F(VerifyCommand, ComparesWithTheSource) {
-  const RunResult text = run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif"});
-  EXPECT_EQ(text.exit_code, 0) << text.out << text.err;
-  EXPECT_EQ(text.err, "");
-  EXPECT_THAT(text.out, HasSubstr("rms"));
   const json report =
       json::parse(run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--json"}).out);
   EXPECT_EQ(report.at("against").at("samples"), 150 * 120);

@@ -92,11 +92,6 @@ TEST_F(BadInput, NothingButNaN) {
   expect_refused(folder / "nan.tif", {"nan.tif", "void"}, {"--type", "f32"}, 1);
 }
 
-TEST_F(BadInput, NothingButNodata) {
-  write_int16_tiff(folder / "flat.tif", 40, 30, [](std::int64_t, std::int64_t) { return std::int16_t{-999}; });
-  expect_refused(folder / "flat.tif", {"flat.tif", "void"}, {"--nodata", "-999"});
-}
-
 TEST_F(BadInput, OneRowOneColumnOneSample) {
   const auto level = [](std::int64_t, std::int64_t) { return std::int16_t{5}; };
   for (const auto& [width, height] : {std::pair{1U, 50U}, {50U, 1U}, {1U, 1U}}) {
@@ -104,14 +99,6 @@ TEST_F(BadInput, OneRowOneColumnOneSample) {
     expect_refused(folder / "thin.tif", {"thin.tif", std::to_string(width) + "x" + std::to_string(height), "2x2"}, {},
                    1);
   }
-}
-
-TEST_F(BadInput, SeveralFilesWithoutAPlace) {
-  write_hills("a.tif");
-  write_hills("b.tif");
-  const RunResult mosaic = run_isohf({"convert", folder / "a.tif", folder / "b.tif", "-o", folder / "c.isohf"});
-  EXPECT_EQ(mosaic.exit_code, 1);
-  EXPECT_THAT(mosaic.err, HasSubstr("does not say where it lies"));
 }
 
 TEST_F(BadInput, OutputIsAFolder) {

@@ -78,12 +78,6 @@ TEST_F(ConfigFile, ArraysServeListsPairsAndOptionsThatRepeat) {
   EXPECT_EQ(run("[verify]\nagainst = ['" + coast_ + "']\nmax-rms = 1e9\n", {"verify", archive}).exit_code, 0);
 }
 
-TEST_F(ConfigFile, BooleansServeFlags) {
-  const RunResult result = run("shadow-seeds = true\nquiet = true\n", {"convert", coast_, folder_ / "a.isohf"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(run_isohf({"info", folder_ / "a.isohf", "--json"}).out, HasSubstr("shadow"));
-}
-
 TEST_F(ConfigFile, WrongKeysAndSectionsAreNamedWithTheirLineAndTheNearest) {
   expect_refused("json = true\nlevelss = 3\n", {"plan"}, 2, "no option is named 'levelss'; did you mean levels?");
   expect_refused("[convert]\ndensty = 1\n", {"plan"}, 2, "convert has no option 'densty'; did you mean density?");

@@ -1,7 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -22,24 +21,6 @@ json parsed(const std::vector<std::string>& arguments) {
   const RunResult result = run_isohf(arguments);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   return json::parse(result.out);
-}
-
-TEST(TilesOption, KeepsTheRaster) {
-  const TemporaryFolder folder;
-  for (const std::string& tiles : {std::string("2x2"), std::string("4x1"), std::string("1x1")}) {
-    const RunResult made = run_isohf({"convert", kCoast, folder / (tiles + ".isohf"), "--tiles", tiles});
-    ASSERT_EQ(made.exit_code, 0) << made.err;
-    EXPECT_EQ(made.err, "");
-    const json against = parsed({"verify", folder / (tiles + ".isohf"), "--against", kCoast, "--json"});
-    const json info = parsed({"info", folder / (tiles + ".isohf"), "--json"});
-    EXPECT_EQ(std::to_string(info.at("grid").at("tile_columns").get<int>()) + "x" +
-                  std::to_string(info.at("grid").at("tile_rows").get<int>()),
-              tiles);
-    EXPECT_NEAR(info.at("grid").at("aspect").get<double>(), 1.0, 0.05);
-    // As much is lost as by the default, not all of it.
-    EXPECT_LT(against.at("against").at("rms").get<double>(), 3.0) << tiles;
-    EXPECT_EQ(against.at("against").at("samples_lost"), 0);
-  }
 }
 
 TEST(TilesOption, ADensityThatNobodyAskedForIsAWarningWithTheFigure) {
@@ -112,44 +93,15 @@ TEST(DensityOption, TakesFractions) {
   }
 }
 
-/// 200 x 150 posts at height 100, a step from anywhere else than the ground beyond: half of what tiles hold is that.
-class SourceStatistics : public testing::Test {
- protected:
-  SourceStatistics() {
-    write_int16_tiff(folder / "a.tif", 200, 150,
-                     [](std::int64_t c, std::int64_t r) { return static_cast<std::int16_t>(100 + 10 * (c + r)); });
-  }
-  json converted(std::vector<std::string> more) {
-    std::vector<std::string> arguments = {"convert", folder / "a.tif", folder / "a.isohf", "--overwrite", "--json"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return parsed(arguments);
-  }
-  TemporaryFolder folder;
-};
-
-TEST_F(SourceStatistics, AreThoseOfTheSourcesGroundWhateverTilesHoldBeyond) {
-  for (const char* outside : {"cover", "clamp", "void"}) {
-    SCOPED_TRACE(outside);
-    const json summary = converted({"--shape", "148x179", "--density", "1", "--outside", outside});
-    const json& statistics = summary.at("metadata").at("statistics");
-    const json grid = parsed({"info", folder / "a.isohf", "--json"}).at("grid");
-    ASSERT_GT(grid.at("world_width").get<double>() * grid.at("world_height").get<double>(), 1.5 * 199 * 149);
-    // The mean of the plane is that of its middle; lattice rows and columns do not end on the edges.
-    EXPECT_NEAR(statistics.at("mean").get<double>(), 100.0 + 10.0 * (199 + 149) / 2.0, 12.0);
-    EXPECT_NEAR(statistics.at("min").get<double>(), 100.0, 0.5);
-    EXPECT_LE(statistics.at("max").get<double>(), 100.0 + 10.0 * (199 + 149));
-    EXPECT_NEAR(statistics.at("vertices").get<double>(), 199.0 * 149.0, 0.03 * 199.0 * 149.0);
-    if (std::string(outside) != "void") {
-      EXPECT_EQ(statistics.at("voids"), 0);
-    }
-    EXPECT_EQ(run_isohf({"verify", folder / "a.isohf", "-q"}).exit_code, 0) << "verify counts the same ones";
-  }
-}
-
-TEST_F(SourceStatistics, SizesAreToldBesideTheSourcesOwnSamples) {
+TEST(SourceStatistics, SizesAreToldBesideTheSourcesOwnSamples) {
+  const TemporaryFolder folder;
+  write_int16_tiff(folder / "a.tif", 200, 150,
+                   [](std::int64_t c, std::int64_t r) { return static_cast<std::int16_t>(100 + 10 * (c + r)); });
   for (const std::vector<std::string>& options :
        std::vector<std::vector<std::string>>{{}, {"--density", "1", "--shape", "148x179"}}) {
-    const json summary = converted(options);
+    std::vector<std::string> arguments = {"convert", folder / "a.tif", folder / "a.isohf", "--overwrite", "--json"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const json summary = parsed(arguments);
     EXPECT_EQ(summary.at("source_samples"), 200 * 150);
     EXPECT_EQ(summary.at("source_bytes"), 2 * 200 * 150);
     const double tile_bytes = summary.at("tile_bytes");
