@@ -54,6 +54,12 @@ class RunningProgram {
   RunResult result_;
 };
 
+/// The words of a command, and more after them.
+inline std::vector<std::string> with_more(std::vector<std::string> words, const std::vector<std::string>& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
 /// Runs a program to its end.
 RunResult run_program(const std::vector<std::string>& command, const RunOptions& options = {});
 

@@ -26,9 +26,7 @@ class ConvertCommand : public testing::Test {
 
   /// Converts a.tif and returns the archive's bytes.
   std::string convert(const std::string& name, std::vector<std::string> more) {
-    std::vector<std::string> arguments = {"convert", folder / "a.tif", folder / name};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const RunResult result = run_isohf(arguments);
+    const RunResult result = run_isohf(with_more({"convert", folder / "a.tif", folder / name}, more));
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_EQ(result.err, "");
     return read_file(folder / name);

@@ -46,9 +46,7 @@ class ConvertEach : public testing::Test {
     return found;
   }
   RunResult each(std::vector<std::string> more = {}) const {
-    std::vector<std::string> all = {"convert", "--each", in_, "--out-dir", out_};
-    all.insert(all.end(), more.begin(), more.end());
-    return run_isohf(all);
+    return run_isohf(with_more({"convert", "--each", in_, "--out-dir", out_}, more));
   }
 
   TemporaryFolder folder_;

@@ -29,9 +29,8 @@ double land(double longitude, double latitude) {
 class ExportBox : public testing::Test {
  protected:
   void convert(const std::string& name, const std::vector<std::string>& more) {
-    std::vector<std::string> arguments = {"convert", folder / name, folder / "a.isohf", "--overwrite", "--type", "f32"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const RunResult made = run_isohf(arguments);
+    const RunResult made =
+        run_isohf(with_more({"convert", folder / name, folder / "a.isohf", "--overwrite", "--type", "f32"}, more));
     ASSERT_EQ(made.exit_code, 0) << made.err;
   }
 

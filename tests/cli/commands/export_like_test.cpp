@@ -39,17 +39,14 @@ class ExportLike : public testing::Test {
   ExportLike() { write_degrees(folder / "wide", 240, 160, 2.0, 42.0, 0.05, land); }
 
   void convert(const std::string& name, const std::string& kind, const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {
-        "convert", folder / name, folder / "a.isohf", "--overwrite", "--projection", kind, "--type", "f32", "-q"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const RunResult result = run_isohf(arguments);
+    const RunResult result = run_isohf(with_more(
+        {"convert", folder / name, folder / "a.isohf", "--overwrite", "--projection", kind, "--type", "f32", "-q"},
+        more));
     ASSERT_EQ(result.exit_code, 0) << result.err;
   }
 
   [[nodiscard]] RunResult run(const std::string& output, const std::vector<std::string>& more) const {
-    std::vector<std::string> arguments = {"export", folder / "a.isohf", folder / output};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_isohf(arguments);
+    return run_isohf(with_more({"export", folder / "a.isohf", folder / output}, more));
   }
 
   /// Exports onto the grid of a raster of the folder.
@@ -63,9 +60,7 @@ class ExportLike : public testing::Test {
   }
 
   void refuses(const std::string& name, const std::string& why, const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"--like", folder / name};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const RunResult result = run("none.tif", arguments);
+    const RunResult result = run("none.tif", with_more({"--like", folder / name}, more));
     EXPECT_EQ(result.exit_code, 2) << result.out;
     EXPECT_THAT(result.err, HasSubstr(why));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;

@@ -42,18 +42,14 @@ void write_stripes(const std::string& path, SampleType type = SampleType::kUint8
 class ExportAsSource : public testing::Test {
  protected:
   void convert(const std::string& input, const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"convert", input, folder / "a.isohf", "--overwrite", "-q"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const RunResult result = run_isohf(arguments);
+    const RunResult result = run_isohf(with_more({"convert", input, folder / "a.isohf", "--overwrite", "-q"}, more));
     ASSERT_EQ(result.exit_code, 0) << result.err;
     ASSERT_EQ(result.out + result.err, "");
   }
 
   [[nodiscard]] RunResult run(const std::string& output, const std::vector<std::string>& more = {},
                               const RunOptions& options = {}) const {
-    std::vector<std::string> arguments = {"export", folder / "a.isohf", folder / output};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_isohf(arguments, options);
+    return run_isohf(with_more({"export", folder / "a.isohf", folder / output}, more), options);
   }
 
   [[nodiscard]] Raster exported(const std::string& output, std::vector<std::string> more = {}) const {
@@ -290,9 +286,9 @@ TEST_F(ExportAsSource, OfAnExtractGivesItsGround) {
     const std::string cut = folder / "cut.tif";
     std::vector<std::string> of_part = {"export", part, cut, "--overwrite", "--json"};
     of_part.insert(of_part.end(), more.begin(), more.end());
-    std::vector<std::string> of_all = {"export", folder / "a.isohf", folder / "all.tif", "--overwrite", "-q"};
-    of_all.insert(of_all.end(), more.begin(), more.end());
-    ASSERT_EQ(run_isohf(of_all).exit_code, 0);
+    ASSERT_EQ(
+        run_isohf(with_more({"export", folder / "a.isohf", folder / "all.tif", "--overwrite", "-q"}, more)).exit_code,
+        0);
     const RunResult result = run_isohf(of_part);
     ASSERT_EQ(result.exit_code, 0) << result.err;
     EXPECT_EQ(json::parse(result.out).at("voids"), 0);

@@ -256,9 +256,8 @@ TEST_F(MosaicCommand, FourHundredFilesGoThroughFewHandles) {
   few.open_files = 40;
   const Words command = {"--nodata", "-9999", "--registration", "point", "--json", "--quiet"};
   const auto run = [&](const std::string& input, const RunOptions& limits) {
-    Words all = {"convert", input, folder / "out.isohf", "--overwrite"};
-    all.insert(all.end(), command.begin(), command.end());
-    const RunResult result = run_isohf(all, limits);
+    const RunResult result =
+        run_isohf(with_more({"convert", input, folder / "out.isohf", "--overwrite"}, command), limits);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result.exit_code == 0 ? json::parse(result.out) : json();
   };

@@ -44,11 +44,7 @@ TEST_F(SampleCommand, ShadowsReachAsHighAsTheEdgeTowardsTheSunLetsThem) {
   const double edge = surface + kSlopeX * 990.0 - 990.0 * std::tan(8.0 * 0.017453292519943295);
   const std::vector<std::string> sun = {"sample", archive,           "--at", "1000", "1000", "--shadow", "--azimuth",
                                         "E",      "--sun-elevation", "8"};
-  const auto with = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> arguments = sun;
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_isohf(arguments);
-  };
+  const auto with = [&](const std::vector<std::string>& more) { return run_isohf(with_more(sun, more)); };
   double numbers[8] = {};
   std::istringstream text(with({}).out);
   for (double& number : numbers) text >> number;
@@ -70,9 +66,8 @@ TEST_F(SampleCommand, ShadowsReachAsHighAsTheEdgeTowardsTheSunLetsThem) {
 
 TEST_F(SampleCommand, RefusesASunThatCastsNoShadow) {
   const std::string archive = folder / "plane.isohf";
-  const auto refused = [&](std::vector<std::string> more) {
-    more.insert(more.begin(), {"sample", archive, "--at", "1000", "1000"});
-    const RunResult result = run_isohf(more);
+  const auto refused = [&](const std::vector<std::string>& more) {
+    const RunResult result = run_isohf(with_more({"sample", archive, "--at", "1000", "1000"}, more));
     EXPECT_EQ(result.exit_code, 2);
     return result.err;
   };
@@ -119,10 +114,7 @@ TEST_F(SampleCommand, PlacesTakeACommaAsWellAsABlank) {
        std::vector<std::vector<std::string>>{{"--at", "1000,900", "--at", "-5,7"},
                                              {"--at=1000,900", "--at", "-5,", "7"},
                                              {"--at", "1000", "900", "--at=-5,7"}}) {
-    std::vector<std::string> arguments = {"sample"};
-    arguments.insert(arguments.end(), places.begin(), places.end());
-    arguments.push_back(folder / "plane.isohf");
-    const RunResult result = run_isohf(arguments);
+    const RunResult result = run_isohf(with_more(with_more({"sample"}, places), {folder / "plane.isohf"}));
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_EQ(result.out, apart.out);
   }

@@ -60,15 +60,13 @@ class ShadeCommand : public testing::Test {
   /// Converts wall.tif and draws it, one pixel for a sample; returns the picture's name.
   std::string draw(const std::vector<std::string>& more, const std::vector<std::string>& converting = {},
                    const std::string& picture = "a.tif") {
-    std::vector<std::string> convert = {
-        "convert", folder / "wall.tif", folder / "a.isohf", "--shape",     "36x35", "--levels",
-        "1",       "--nodata",          "-32768",           "--overwrite", "-q"};
-    convert.insert(convert.end(), converting.begin(), converting.end());
-    const RunResult converted = run_isohf(convert);
+    const RunResult converted =
+        run_isohf(with_more({"convert", folder / "wall.tif", folder / "a.isohf", "--shape", "36x35", "--levels", "1",
+                             "--nodata", "-32768", "--overwrite", "-q"},
+                            converting));
     EXPECT_EQ(converted.exit_code, 0) << converted.err;
-    std::vector<std::string> shade = {"shade", folder / "a.isohf", "-o", folder / picture, "--overwrite", "-q"};
-    shade.insert(shade.end(), more.begin(), more.end());
-    const RunResult shaded = run_isohf(shade);
+    const RunResult shaded =
+        run_isohf(with_more({"shade", folder / "a.isohf", "-o", folder / picture, "--overwrite", "-q"}, more));
     EXPECT_EQ(shaded.exit_code, 0) << shaded.err;
     EXPECT_EQ(shaded.out + shaded.err, "");
     return folder / picture;
@@ -141,9 +139,9 @@ TEST_F(ShadeCommand, HillshadesRankPixelsAsGdalDoes) {
   const std::string size = fmt::format("{}x{}", source.width, source.height);
   for (const std::vector<std::string>& light :
        std::vector<std::vector<std::string>>{{}, {"-az", "200", "-alt", "30"}, {"-z", "0.5"}}) {
-    std::vector<std::string> theirs = {"gdaldem", "hillshade", input, folder / "g.tif", "-q", "-compute_edges"};
-    theirs.insert(theirs.end(), light.begin(), light.end());
-    ASSERT_EQ(run_gdal(theirs).exit_code, 0);
+    ASSERT_EQ(
+        run_gdal(with_more({"gdaldem", "hillshade", input, folder / "g.tif", "-q", "-compute_edges"}, light)).exit_code,
+        0);
     std::vector<std::string> ours = {"shade", folder / "r.isohf", folder / "h.tif", "--overwrite", "-q", "--size",
                                      size,    "--hillshade"};
     for (const std::string& word : light) {
@@ -233,11 +231,11 @@ TEST_F(ShadeCommand, PalettesSuitTheBody) {
     spec.overwrite = true;
     write_raster(folder / "body.tif", spec, std::as_bytes(std::span(heights)));
     EXPECT_EQ(run_isohf({"convert", folder / "body.tif", folder / "b.isohf", "-q", "--overwrite"}).exit_code, 0);
-    std::vector<std::string> shade = {
-        "shade", folder / "b.isohf", folder / "b.tif",  "--overwrite", "-q", "--exaggeration",
-        "0.001", "--no-shadow",      "--sun-elevation", "60"};
-    shade.insert(shade.end(), more.begin(), more.end());
-    EXPECT_EQ(run_isohf(shade).exit_code, 0);
+    EXPECT_EQ(run_isohf(with_more({"shade", folder / "b.isohf", folder / "b.tif", "--overwrite", "-q", "--exaggeration",
+                                   "0.001", "--no-shadow", "--sun-elevation", "60"},
+                                  more))
+                  .exit_code,
+              0);
     return read_channel(folder / "b.tif", "0").at(15, 5) - read_channel(folder / "b.tif", "2").at(15, 5);
   };
   EXPECT_GT(hue(3396190, {}), hue(1737400, {}) + 30) << "red over blue";
@@ -252,9 +250,7 @@ TEST_F(ShadeCommand, TellsOfReliefThatCannotBeSeen) {
   write_raster(folder / "fractions.exr", spec, std::as_bytes(std::span(heights)));
   ASSERT_EQ(run_isohf({"convert", folder / "fractions.exr", folder / "f.isohf", "-q"}).exit_code, 0);
   const auto said = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> shade = {"shade", folder / "f.isohf", folder / "f.png", "--overwrite"};
-    shade.insert(shade.end(), more.begin(), more.end());
-    const RunResult result = run_isohf(shade);
+    const RunResult result = run_isohf(with_more({"shade", folder / "f.isohf", folder / "f.png", "--overwrite"}, more));
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result.err;
   };

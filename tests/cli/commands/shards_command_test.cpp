@@ -38,10 +38,9 @@ class ShardsCommand : public testing::Test {
     return run_isohf(words, options);
   }
   Words words_of(const std::string& number, const std::string& output, const Words& more = {}) {
-    Words words = {"convert", "land.tif", "-o",        output,  "--shard",       number,
-                   "--shape", "28x35",    "--z-range", "0:500", "--shadow-seeds"};
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
+    return with_more({"convert", "land.tif", "-o", output, "--shard", number, "--shape", "28x35", "--z-range", "0:500",
+                      "--shadow-seeds"},
+                     more);
   }
   void make_shards(const std::string& stem, const Words& more = {}) {
     for (const char* k : {"1", "2", "3"}) {

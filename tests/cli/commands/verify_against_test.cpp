@@ -78,14 +78,11 @@ class VerifyAgainst : public testing::Test {
   }
 
   RunResult convert(const std::string& input, const Words& options) const {
-    Words words = {"convert", folder / input, "-o", folder / "a.isohf", "--overwrite", "--quiet"};
-    words.insert(words.end(), options.begin(), options.end());
-    return run_isohf(words);
+    return run_isohf(
+        with_more({"convert", folder / input, "-o", folder / "a.isohf", "--overwrite", "--quiet"}, options));
   }
   RunResult verify(const std::string& input, const Words& options = {}) const {
-    Words words = {"verify", folder / "a.isohf", "--against", folder / input};
-    words.insert(words.end(), options.begin(), options.end());
-    return run_isohf(words);
+    return run_isohf(with_more({"verify", folder / "a.isohf", "--against", folder / input}, options));
   }
 
   TemporaryFolder folder;
@@ -201,9 +198,7 @@ TEST_F(VerifyAgainst, WarnsOfARasterWithoutAPlace) {
 TEST_F(VerifyAgainst, OfAnExtractOnlyItsOwnGroundIsCompared) {
   const std::string part = folder / "part.isohf";
   for (const Words& with : std::vector<Words>{{}, {"--projection", "utm"}}) {
-    Words options = {"--shape", "12x19", "--outside", "void"};
-    options.insert(options.end(), with.begin(), with.end());
-    ASSERT_EQ(convert("land.flt", options).exit_code, 0);
+    ASSERT_EQ(convert("land.flt", with_more({"--shape", "12x19", "--outside", "void"}, with)).exit_code, 0);
     ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", part, "--tiles", "1:3,1:2", "--overwrite"}).exit_code, 0);
     const Words against = {"verify", part, "--against", folder / "land.flt", "--json"};
     const RunResult sound = run_isohf(against);
@@ -219,9 +214,7 @@ TEST_F(VerifyAgainst, OfAnExtractOnlyItsOwnGroundIsCompared) {
 
 TEST_F(VerifyAgainst, TakesWhatWasCutFromACoarsePlane) {
   for (const Words& with : std::vector<Words>{{}, {"--outside", "void"}, {"--type", "f32"}}) {
-    Words options = {"--shape", "12x19", "--density", "2"};
-    options.insert(options.end(), with.begin(), with.end());
-    ASSERT_EQ(convert("land.flt", options).exit_code, 0);
+    ASSERT_EQ(convert("land.flt", with_more({"--shape", "12x19", "--density", "2"}, with)).exit_code, 0);
     const std::string plane = folder / "plane.isohf";
     ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", plane, "--plane", "1", "--overwrite"}).exit_code, 0);
     const RunResult sound = run_isohf({"verify", plane, "--against", folder / "land.flt"});

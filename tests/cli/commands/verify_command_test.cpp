@@ -50,10 +50,7 @@ TEST_F(VerifyCommand, ComparesWithTheSource) {
 
   const std::vector<std::string> base = {"verify", folder / "a.isohf", "--against", folder / "a.tif"};
   const auto code_with = [&](const std::string& option, double limit) {
-    std::vector<std::string> arguments = base;
-    arguments.push_back(option);
-    arguments.push_back(std::to_string(limit));
-    return run_isohf(arguments).exit_code;
+    return run_isohf(with_more(base, {option, std::to_string(limit)})).exit_code;
   };
   EXPECT_EQ(code_with("--max-error", max * 1.01), 0);
   EXPECT_EQ(code_with("--max-error", max * 0.99), 3);

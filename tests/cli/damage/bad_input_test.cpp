@@ -27,9 +27,7 @@ class BadInput : public testing::Test {
   void expect_refused(const std::string& input, const std::vector<std::string>& parts,
                       const std::vector<std::string>& more = {}, std::optional<int> code = std::nullopt) {
     const std::vector<std::string> before = folder.names();
-    std::vector<std::string> arguments = {"convert", input, folder / "out.isohf"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const RunResult result = run_isohf(arguments);
+    const RunResult result = run_isohf(with_more({"convert", input, folder / "out.isohf"}, more));
     EXPECT_THAT(result.exit_code, AnyOf(code.value_or(1), code.value_or(2)));
     EXPECT_EQ(result.out, "");
     EXPECT_THAT(result.err, testing::StartsWith("isohf: "));

@@ -19,10 +19,9 @@ class Interrupt : public testing::Test {
   Interrupt() { write_sparse_tiff(folder / "big.tif", 7000, kSanitized ? 5000 : 20000); }
 
   std::vector<std::string> command(const std::string& output, const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> all = {isohf_path(), "convert", folder / "big.tif", folder / output,
-                                    "--z-range",  "0:100",   "--progress",       "json"};
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
+    return with_more(
+        {isohf_path(), "convert", folder / "big.tif", folder / output, "--z-range", "0:100", "--progress", "json"},
+        more);
   }
 
   /// Starts a conversion, sends the signal once tiles are written, and returns how it ended.

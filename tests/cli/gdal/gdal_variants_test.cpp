@@ -133,17 +133,13 @@ TEST_F(GdalVariants, TransparentSamplesAreVoids) {
   ASSERT_LT(voids, static_cast<std::ptrdiff_t>(expected.size()) - 1000);
   const std::vector<std::string> inside = {
       "-mask", "mask,1", "-a_nodata", "none", "--config", "GDAL_TIFF_INTERNAL_MASK", "YES"};
-  const auto with = [](std::vector<std::string> options, const std::vector<std::string>& more) {
-    options.insert(options.end(), more.begin(), more.end());
-    return options;
-  };
   for (const Variant& variant : std::vector<Variant>{
            {"inside.tif", inside},
-           {"tiles.tif", with(inside, {"-co", "TILED=YES", "-co", "BLOCKXSIZE=32", "-co", "BLOCKYSIZE=16"})},
-           {"deflated.tif", with(inside, {"-co", "COMPRESS=DEFLATE", "-co", "PREDICTOR=2"})},
+           {"tiles.tif", with_more(inside, {"-co", "TILED=YES", "-co", "BLOCKXSIZE=32", "-co", "BLOCKYSIZE=16"})},
+           {"deflated.tif", with_more(inside, {"-co", "COMPRESS=DEFLATE", "-co", "PREDICTOR=2"})},
            {"cog.tif", {"-of", "COG", "-mask", "mask,1", "-a_nodata", "none"}},
            {"beside.tif", {"-mask", "mask,1", "-a_nodata", "none", "--config", "GDAL_TIFF_INTERNAL_MASK", "NO"}},
-           {"both.tif", with(inside, {"-a_nodata", "-9999"})}}) {
+           {"both.tif", with_more(inside, {"-a_nodata", "-9999"})}}) {
     SCOPED_TRACE(variant.name);
     ASSERT_NO_FATAL_FAILURE(translate(folder_ / "sea.tif", variant.name, variant.options));
     EXPECT_TRUE(elevations(folder_ / variant.name) == expected);

@@ -23,9 +23,7 @@ class CrsOption : public testing::Test {
   CrsOption() { write_text(grid_, small_grid()); }
 
   [[nodiscard]] RunResult convert(const std::string& system, const Words& more = {}) const {
-    Words words = {"convert", grid_, archive_, "--crs", system, "--quiet", "--overwrite"};
-    words.insert(words.end(), more.begin(), more.end());
-    return run_isohf(words);
+    return run_isohf(with_more({"convert", grid_, archive_, "--crs", system, "--quiet", "--overwrite"}, more));
   }
   [[nodiscard]] json crs() const {
     return json::parse(run_isohf({"info", archive_, "--json"}).out).at("metadata").at("source").at("crs");

@@ -99,9 +99,8 @@ TEST(SourceStatistics, SizesAreToldBesideTheSourcesOwnSamples) {
                    [](std::int64_t c, std::int64_t r) { return static_cast<std::int16_t>(100 + 10 * (c + r)); });
   for (const std::vector<std::string>& options :
        std::vector<std::vector<std::string>>{{}, {"--density", "1", "--shape", "148x179"}}) {
-    std::vector<std::string> arguments = {"convert", folder / "a.tif", folder / "a.isohf", "--overwrite", "--json"};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    const json summary = parsed(arguments);
+    const json summary =
+        parsed(with_more({"convert", folder / "a.tif", folder / "a.isohf", "--overwrite", "--json"}, options));
     EXPECT_EQ(summary.at("source_samples"), 200 * 150);
     EXPECT_EQ(summary.at("source_bytes"), 2 * 200 * 150);
     const double tile_bytes = summary.at("tile_bytes");

@@ -74,9 +74,7 @@ TEST_F(ManyFiles, AreVerifiedInOrderAndTheBadOneStopsNoOther) {
 
 TEST_F(ManyFiles, FoldersPatternsAndListsAreTaken) {
   const auto archives = [&](const Words& named) {
-    Words command = {"verify", "--json"};
-    command.insert(command.end(), named.begin(), named.end());
-    const RunResult result = run_isohf(command);
+    const RunResult result = run_isohf(with_more({"verify", "--json"}, named));
     EXPECT_EQ(result.exit_code, 0) << result.err;
     std::vector<std::string> names;
     const std::vector<json> documents =

@@ -86,9 +86,7 @@ class MapCommand : public testing::Test {
   }
 
   RunResult convert(const std::string& input, const std::string& output, const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments = {"convert", folder / input, folder / output, "--overwrite", "--type", "f32"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_isohf(arguments);
+    return run_isohf(with_more({"convert", folder / input, folder / output, "--overwrite", "--type", "f32"}, more));
   }
   json info(const std::string& name) { return json::parse(run_isohf({"info", folder / name, "--json"}).out); }
 
@@ -237,9 +235,7 @@ TEST_F(MapCommand, SampleTakesAndGivesTheInputsOwnCoordinatesAndDegrees) {
     const MapPoint there = understand_system(epsg)->map_from_geo(place);
     const std::string crs = fmt::format("{:.6f} {:.6f}\n", there.easting, there.northing);
     const auto sample = [&](const std::vector<std::string>& more, const std::string& input = "") {
-      std::vector<std::string> arguments = {"sample", folder / archive};
-      arguments.insert(arguments.end(), more.begin(), more.end());
-      const RunResult result = run_isohf(arguments, with_input(input));
+      const RunResult result = run_isohf(with_more({"sample", folder / archive}, more), with_input(input));
       EXPECT_EQ(result.exit_code, 0) << result.err;
       EXPECT_EQ(result.err, "");
       return result.out;
@@ -292,9 +288,7 @@ TEST_F(MapCommand, SampleWithoutTheModuleTakesWhatNeedsNone) {
 
 /// What the dynamic linker loads while the program runs.
 std::string loaded_libraries(const std::vector<std::string>& arguments) {
-  std::vector<std::string> command = {"/usr/bin/env", "LD_DEBUG=files", isohf_path()};
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  const RunResult result = run_program(command);
+  const RunResult result = run_program(with_more({"/usr/bin/env", "LD_DEBUG=files", isohf_path()}, arguments));
   EXPECT_EQ(result.exit_code, 0) << result.out;
   return result.err;
 }

@@ -31,10 +31,8 @@ class MaxError : public testing::Test {
   }
 
   RunResult convert(std::vector<std::string> more) {
-    std::vector<std::string> arguments = {"convert", folder / "a.tif", folder / "a.isohf", "--overwrite",
-                                          "--nodata=-32768"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_isohf(arguments);
+    return run_isohf(
+        with_more({"convert", folder / "a.tif", folder / "a.isohf", "--overwrite", "--nodata=-32768"}, more));
   }
   json against() {
     const RunResult result = run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.tif", "--json"});
@@ -135,12 +133,10 @@ TEST_F(MaxError, InfoPrintsWhatWasMeasuredAndVerifyFindsWhatIsNotTrue) {
 
 TEST_F(MaxError, PlanAndSummaryExpectTheErrorToAFactorOfTwo) {
   for (const std::vector<std::string>& way : std::vector<std::vector<std::string>>{{}, {"--density", "0.3"}}) {
-    std::vector<std::string> arguments = {"plan", folder / "a.tif", "--nodata=-32768", "--json"};
-    arguments.insert(arguments.end(), way.begin(), way.end());
-    const json planned = json::parse(run_isohf(arguments).out).at("expected_error");
-    std::vector<std::string> more = {"--json"};
-    more.insert(more.end(), way.begin(), way.end());
-    EXPECT_EQ(json::parse(convert(more).out).at("expected_error"), planned);
+    const json planned =
+        json::parse(run_isohf(with_more({"plan", folder / "a.tif", "--nodata=-32768", "--json"}, way)).out)
+            .at("expected_error");
+    EXPECT_EQ(json::parse(convert(with_more({"--json"}, way)).out).at("expected_error"), planned);
     const json found = against();
     EXPECT_GT(planned.at("rms").get<double>(), 0.5 * found.at("rms").get<double>());
     EXPECT_LT(planned.at("rms").get<double>(), 2.0 * found.at("rms").get<double>());

@@ -36,18 +36,14 @@ std::string wide_raster() {
 
 /// Runs isohf and what it took, as the child of a small program: a program counts what its parent held when it was begun.
 RunResult run_measured(const std::vector<std::string>& arguments, const std::string& figures, double& peak_megabytes) {
-  std::vector<std::string> command = {
-      "/usr/bin/env",
-      "python3",
-      "-c",
-      "import resource, subprocess, sys\n"
-      "code = subprocess.call(sys.argv[2:])\n"
-      "open(sys.argv[1], 'w').write(str(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss))\n"
-      "sys.exit(code)",
-      figures,
-      isohf_path()};
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  RunResult result = run_program(command);
+  RunResult result = run_program(
+      with_more({"/usr/bin/env", "python3", "-c",
+                 "import resource, subprocess, sys\n"
+                 "code = subprocess.call(sys.argv[2:])\n"
+                 "open(sys.argv[1], 'w').write(str(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss))\n"
+                 "sys.exit(code)",
+                 figures, isohf_path()},
+                arguments));
   peak_megabytes = std::stod(read_file(figures)) * 1024e-6;
   return result;
 }
@@ -121,17 +117,10 @@ TEST(Memory, ConvertStaysWithinATenthOfWhatItIsGivenAndWritesTheSameBytes) {
   const TemporaryFolder folder;
   write_file(folder / "wide.raw", wide_raster());
   const auto convert = [&](const std::string& name, std::vector<std::string> more) {
-    std::vector<std::string> command = {"convert",
-                                        folder / "wide.raw",
-                                        folder / name,
-                                        "--raw",
-                                        std::to_string(kWidth) + "x" + std::to_string(kHeight) + ":u16le",
-                                        "-j",
-                                        "2",
-                                        "--json",
-                                        "--overwrite"};
-    command.insert(command.end(), more.begin(), more.end());
-    return run_isohf(command);
+    return run_isohf(with_more(
+        {"convert", folder / "wide.raw", folder / name, "--raw",
+         std::to_string(kWidth) + "x" + std::to_string(kHeight) + ":u16le", "-j", "2", "--json", "--overwrite"},
+        more));
   };
   for (const std::vector<std::string>& filter :
        {std::vector<std::string>{"--filter", "bilinear"}, {"--filter", "bspline3", "--shadow-seeds"}}) {

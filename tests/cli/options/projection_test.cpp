@@ -35,9 +35,8 @@ class ProjectionCommand : public testing::Test {
 
   RunResult isohf(const std::vector<std::string>& arguments) { return run_isohf(arguments); }
   void converts(const std::vector<std::string>& more) {
-    std::vector<std::string> arguments = {"convert", folder / "wide.flt", folder / "a.isohf", "--overwrite"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const RunResult result = run_isohf(arguments);
+    const RunResult result =
+        run_isohf(with_more({"convert", folder / "wide.flt", folder / "a.isohf", "--overwrite"}, more));
     ASSERT_EQ(result.exit_code, 0) << result.err;
     EXPECT_EQ(result.err, "");
   }
@@ -153,9 +152,7 @@ TEST(MarsMegdr, LandsAtItsRadiusAndLongitude) {
   const Georeference& place = source->info().georeference;
   for (const std::vector<std::string>& more :
        {std::vector<std::string>{}, std::vector<std::string>{"--wrap-x", "--filter", "bspline3"}}) {
-    std::vector<std::string> arguments = {"convert", label, folder / "mars.isohf", "--overwrite"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    ASSERT_EQ(run_isohf(arguments).exit_code, 0);
+    ASSERT_EQ(run_isohf(with_more({"convert", label, folder / "mars.isohf", "--overwrite"}, more)).exit_code, 0);
     const json metadata = json::parse(run_isohf({"info", folder / "mars.isohf", "--json"}).out).at("metadata");
     EXPECT_EQ(metadata.at("source").at("body").at("name"), "Mars");
     EXPECT_EQ(metadata.at("projection").at("semi_major_axis_m"), 3396000.0);

@@ -25,9 +25,7 @@ class ResumeComplete : public testing::Test {
     before_ = read_text(output_);
   }
   RunResult resume(std::vector<std::string> more = {"--filter", "nearest"}) const {
-    std::vector<std::string> all = {"convert", input_, output_, "--resume"};
-    all.insert(all.end(), more.begin(), more.end());
-    return run_isohf(all);
+    return run_isohf(with_more({"convert", input_, output_, "--resume"}, more));
   }
   void expect_refused(const std::vector<std::string>& more, const std::string& why) const {
     const RunResult result = resume(more);

@@ -63,9 +63,7 @@ TEST_F(ShadowSeedsOption, SummarySaysWhatTheyTake) {
 TEST_F(ShadowSeedsOption, RefusesWhatIsNoSun) {
   for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
            {"--sun-min", "3"}, {"--shadow-seeds", "--sun-min", "0"}, {"--shadow-seeds", "--sun-min", "x"}}) {
-    std::vector<std::string> arguments = {"convert", folder / "a.tif", folder / "a.isohf"};
-    arguments.insert(arguments.end(), wrong.begin(), wrong.end());
-    const RunResult result = run_isohf(arguments);
+    const RunResult result = run_isohf(with_more({"convert", folder / "a.tif", folder / "a.isohf"}, wrong));
     EXPECT_EQ(result.exit_code, 2) << result.err;
     EXPECT_THAT(result.err, testing::AnyOf(HasSubstr("--shadow-seeds"), HasSubstr("--sun-min")));
     EXPECT_EQ(folder.names(), std::vector<std::string>{"a.tif"});

@@ -34,9 +34,8 @@ class VoidOptions : public testing::Test {
 
   /// Converts, expects nothing on standard error, and returns the summary.
   json convert(std::vector<std::string> options, const std::string& name = "a.isohf") const {
-    std::vector<std::string> arguments = {"convert", folder / "a.tif", folder / name, "--overwrite", "--json"};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    const RunResult result = run_isohf(arguments);
+    const RunResult result =
+        run_isohf(with_more({"convert", folder / "a.tif", folder / name, "--overwrite", "--json"}, options));
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_EQ(result.err, "");
     return result.exit_code == 0 ? json::parse(result.out) : json();

@@ -28,10 +28,9 @@ class ZRange : public testing::Test {
   }
 
   RunResult convert(std::vector<std::string> more, const std::string& filter = "bilinear") {
-    std::vector<std::string> arguments = {
-        "convert", folder / "slope.tif", folder / "a.isohf", "--overwrite", "--nodata", "-32768", "--filter", filter};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_isohf(arguments);
+    return run_isohf(with_more(
+        {"convert", folder / "slope.tif", folder / "a.isohf", "--overwrite", "--nodata", "-32768", "--filter", filter},
+        more));
   }
 
   /// Every stored elevation, padding included.
