@@ -20,6 +20,7 @@
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/error.h"
 #include "isohf/verify.h"
+#include "support/error_of.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -127,13 +128,9 @@ TEST_F(ArchiveReaderTest, RefusesEveryTruncation) {
 
 /// The error's text; it must be one of input and output.
 std::string io_error_of(const std::function<void()>& deed) {
-  try {
-    deed();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kIo);
-    return error.what();
-  }
-  return "no error";
+  const Error error = test::error_of(deed);
+  EXPECT_EQ(error.code(), ErrorCode::kIo);
+  return error.what();
 }
 
 TEST_F(ArchiveReaderTest, SaysThatAnotherProgramCutTheOpenFile) {

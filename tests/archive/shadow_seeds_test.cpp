@@ -10,6 +10,7 @@
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/error.h"
+#include "support/error_of.h"
 
 namespace isohf {
 namespace {
@@ -145,12 +146,9 @@ TEST(ShadowSeeds, EveryHeaderFieldIsChecked) {
       if (payload[i] == static_cast<std::byte>(value)) continue;
       auto damaged = payload;
       damaged[i] = static_cast<std::byte>(value);
-      try {
-        (void)decode_hull_seeds(c.grid, c.index, c.edges, damaged);
-        ADD_FAILURE() << "byte " << i << " = " << value;
-      } catch (const Error& error) {
-        EXPECT_EQ(error.code(), i == 0 ? ErrorCode::kUnsupported : ErrorCode::kCorrupt);
-      }
+      EXPECT_EQ(test::error_of([&] { (void)decode_hull_seeds(c.grid, c.index, c.edges, damaged); }).code(),
+                i == 0 ? ErrorCode::kUnsupported : ErrorCode::kCorrupt)
+          << "byte " << i << " = " << value;
     }
   }
 }

@@ -16,6 +16,7 @@
 #include "isohf/archive.h"
 #include "isohf/archive/tile/tile_codes.h"
 #include "isohf/error.h"
+#include "support/error_of.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -72,21 +73,21 @@ void complete(ArchiveWriter& writer, const TileGrid& grid) {
   static_cast<void>(writer.finish(metadata));
 }
 
+/// Opens a writer that must not be opened.
+std::function<void()> opening(const std::string& path, const TileGrid& grid, const WriterOptions& options) {
+  return [=] { ArchiveWriter(path, grid, options); };
+}
+
 ErrorCode code_of(const std::function<void()>& deed, const std::string& part_of_message) {
-  try {
-    deed();
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr(part_of_message));
-    return error.code();
-  }
-  ADD_FAILURE() << "nothing was thrown";
-  return ErrorCode::kCancelled;
+  const Error error = test::error_of(deed);
+  EXPECT_THAT(error.what(), HasSubstr(part_of_message));
+  return error.code();
 }
 
 TEST(ArchiveWriter, RefusesTargetsThatItMustNotWrite) {
   const TemporaryFolder folder;
   const TileGrid grid = small_grid();
-  const auto open = [&](const std::string& path) { return [&grid, path] { ArchiveWriter(path, grid, {}); }; };
+  const auto open = [&](const std::string& path) { return opening(path, grid, {}); };
   test::write_file(folder / "there", "x");
   EXPECT_EQ(code_of(open(folder / "there"), "is no isohf archive"), ErrorCode::kInvalidArgument);
   EXPECT_EQ(code_of(open(folder / "."), "folder"), ErrorCode::kInvalidArgument);
@@ -112,12 +113,7 @@ TEST(ArchiveWriter, LetsOneProcessWriteATarget) {
   const TileGrid grid = small_grid();
   ArchiveWriter writer(folder / "a", grid, plain());
   for (const bool resume : {false, true}) {
-    EXPECT_EQ(code_of(
-                  [&] {
-                    ArchiveWriter(folder / "a", grid, {true, resume, "", kPlanes});
-                  },
-                  "another process"),
-              ErrorCode::kIo);
+    EXPECT_EQ(code_of(opening(folder / "a", grid, {true, resume, "", kPlanes}), "another process"), ErrorCode::kIo);
   }
   complete(writer, grid);  // unharmed
   EXPECT_EQ(ArchiveReader(folder / "a").check_structure(), std::vector<std::string>{});
@@ -145,15 +141,10 @@ TEST(ArchiveWriter, ReplacesWhereItMay) {
   }
   EXPECT_THAT(folder.names(), ElementsAre("a"));
   EXPECT_EQ(ArchiveReader(folder / "a").metadata().tiles_stored, 18);
-  EXPECT_EQ(code_of([&] { ArchiveWriter(folder / "a", grid, plain()); }, "exists; `overwrite`"),
-            ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code_of(opening(folder / "a", grid, plain()), "exists; `overwrite`"), ErrorCode::kInvalidArgument);
   for (const char* other : {"text", "PK\x03\x04 a ZIP archive of something else, longer than a header"}) {
     test::write_file(folder / "b", other);
-    EXPECT_EQ(code_of(
-                  [&] {
-                    ArchiveWriter(folder / "b", grid, {true, false, "", kPlanes});
-                  },
-                  "b: is no isohf archive"),
+    EXPECT_EQ(code_of(opening(folder / "b", grid, {true, false, "", kPlanes}), "b: is no isohf archive"),
               ErrorCode::kInvalidArgument);
     EXPECT_EQ(test::read_file(folder / "b"), other);
   }
@@ -275,11 +266,7 @@ TEST_F(Resume, GoesBackToTheLastTileThatIsWhole) {
 TEST_F(Resume, RefusesThePartOfAnotherJob) {
   stop_at(5);
   const std::vector<std::byte> before = test::read_bytes(part());
-  EXPECT_EQ(code_of(
-                [&] {
-                  ArchiveWriter(folder_ / "a", grid_, {true, true, "other", kPlanes});
-                },
-                "other"),
+  EXPECT_EQ(code_of(opening(folder_ / "a", grid_, {true, true, "other", kPlanes}), "other"),
             ErrorCode::kInvalidArgument);
   EXPECT_EQ(test::read_bytes(part()), before);
   EXPECT_EQ(go_on(), 5);

@@ -9,6 +9,7 @@
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "support/error_of.h"
 
 namespace isohf {
 namespace {
@@ -123,12 +124,7 @@ TEST(ApplyOpenOptions, RefusesValuesWithoutMeaning) {
     SourceInfo info = sample_info(SampleType::kUint8);
     OpenOptions options;
     set(options);
-    try {
-      apply_open_options(info, options);
-    } catch (const Error& error) {
-      return error.code() == ErrorCode::kInvalidArgument;
-    }
-    return false;
+    return test::error_of([&] { apply_open_options(info, options); }).code() == ErrorCode::kInvalidArgument;
   };
   EXPECT_TRUE(refused([](OpenOptions& o) { o.spacing = 0.0; }));
   EXPECT_TRUE(refused([](OpenOptions& o) { o.spacing = -1.0; }));

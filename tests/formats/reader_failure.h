@@ -8,6 +8,7 @@
 #include <string>
 
 #include "isohf/error.h"
+#include "support/error_of.h"
 #include "support/rasters/samples.h"
 
 namespace isohf::test {
@@ -31,18 +32,6 @@ std::string failure_of(const std::string& path, ErrorCode* code, const Use& use)
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
     return message.empty() ? "?" : message;
   }
-}
-
-/// The Error that `action` throws; fails the test where it throws none.
-template <typename Action>
-Error error_of(const Action& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error;
-  }
-  ADD_FAILURE() << "no error";
-  return {ErrorCode::kCancelled, ""};
 }
 
 }  // namespace isohf::test

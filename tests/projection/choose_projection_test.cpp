@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "isohf/error.h"
+#include "support/error_of.h"
 
 namespace isohf {
 namespace {
@@ -21,14 +22,9 @@ ProjectionChoice choose(const std::string& request, const GeoExtent& ground, boo
 }
 
 std::string refusal_of(const std::string& request, const ProjectionProblem& problem) {
-  try {
-    (void)choose_projection(ProjectionRequest::parse(request), problem);
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-    return error.what();
-  }
-  ADD_FAILURE() << request << " was taken";
-  return {};
+  const Error error = test::error_of([&] { (void)choose_projection(ProjectionRequest::parse(request), problem); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument) << request;
+  return error.what();
 }
 
 TEST(ChooseProjection, AutoKeepsSmallGroundsEquirectangular) {

@@ -5,6 +5,7 @@
 
 #include "isohf/error.h"
 #include "isohf/projection/projection_wkt.h"
+#include "support/error_of.h"
 
 namespace isohf {
 namespace {
@@ -13,14 +14,9 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 std::string refusal_of(const std::string& text) {
-  try {
-    (void)ProjectionRequest::parse(text);
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-    return error.what();
-  }
-  ADD_FAILURE() << text << " was taken";
-  return {};
+  const Error error = test::error_of([&] { (void)ProjectionRequest::parse(text); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument) << text;
+  return error.what();
 }
 
 TEST(ProjectionRequest, ReadsKindsAndParameters) {

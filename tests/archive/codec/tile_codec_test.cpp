@@ -5,7 +5,6 @@
 
 #include <bit>
 #include <cstring>
-#include <random>
 
 #include "archive/deflate/zlib_inflate.h"
 #include "archive/tile/tiles.h"
@@ -13,6 +12,7 @@
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/tile/tile_payload.h"
 #include "isohf/error.h"
+#include "support/error_of.h"
 
 namespace isohf {
 namespace {
@@ -56,12 +56,7 @@ TEST(TileCodec, BringsBackEverySampleOfEveryKindOfTile) {
 }
 
 void expect_error(const TileShape& shape, CodeType type, const std::vector<std::byte>& payload, ErrorCode code) {
-  try {
-    static_cast<void>(decode_tile(shape, type, payload));
-    ADD_FAILURE() << "decoded";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), code) << error.what();
-  }
+  EXPECT_EQ(test::error_of([&] { (void)decode_tile(shape, type, payload); }).code(), code);
 }
 
 TEST(TileCodec, BringsBackALargeTile) {
@@ -148,22 +143,6 @@ TEST(TileCodec, SurvivesEveryFlippedBit) {
         }
         payload[bit / 8] ^= static_cast<std::byte>(1U << bit % 8);
       }
-    }
-  }
-}
-
-TEST(TileCodec, SurvivesNoiseBehindAValidHeader) {
-  const TileShape shape = TileShape::make(24, 29, 1);
-  std::mt19937 random(1);
-  const std::vector<std::byte> good =
-      payload_of(encode_tile(shape, test::make_tile(shape, CodeType::kU16, Kind::kTerrain, 2)));
-  for (int round = 0; round < 2000; ++round) {
-    std::vector<std::byte> payload = good;
-    const std::size_t from = random() % payload.size();
-    for (std::size_t i = from; i < payload.size(); ++i) payload[i] = static_cast<std::byte>(random());
-    try {
-      static_cast<void>(decode_tile(shape, CodeType::kU16, payload));
-    } catch (const Error&) {
     }
   }
 }

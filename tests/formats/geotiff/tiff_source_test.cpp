@@ -1,5 +1,6 @@
 #include "formats/readers.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -9,6 +10,7 @@
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "support/error_of.h"
 #include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
@@ -44,12 +46,7 @@ class TiffSource : public testing::Test {
   }
 
   ErrorCode code_of(const TiffBytes& tiff, const OpenOptions& options = {}) const {
-    try {
-      (void)values(tiff, options);
-    } catch (const Error& error) {
-      return error.code();
-    }
-    return ErrorCode::kCancelled;
+    return test::error_of([&] { (void)values(tiff, options); }).code();
   }
 
   const test::TemporaryFolder folder_;

@@ -10,6 +10,7 @@
 #include "formats/io/zip_archive.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "support/error_of.h"
 #include "support/rasters/every_window.h"
 #include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
@@ -50,15 +51,9 @@ std::vector<std::byte> zipped(const std::string& name, const std::vector<std::by
 }
 
 ErrorCode code_of(const std::string& path, const OpenOptions& options = {}) {
-  try {
-    const auto source = open_hgt(path, options);
-    (void)test::read_whole(*source);
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find(path), std::string::npos) << error.what();
-    return error.code();
-  }
-  ADD_FAILURE() << path << " opened";
-  return ErrorCode::kCancelled;
+  const Error error = test::error_of([&] { (void)test::read_whole(*open_hgt(path, options)); });
+  EXPECT_NE(std::string(error.what()).find(path), std::string::npos) << error.what();
+  return error.code();
 }
 
 TEST_F(HgtSource, TakesTheCornerFromTheName) {

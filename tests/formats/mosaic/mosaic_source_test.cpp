@@ -10,6 +10,7 @@
 #include "formats/mosaic/mosaic_pieces.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "support/error_of.h"
 #include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
@@ -325,13 +326,9 @@ TEST(MosaicSource, AChangedOrBrokenMemberIsAnErrorThatNamesIt) {
   const std::vector<std::string> paths = write_pieces(raster, folder / "", {{0, 0, 20, 10}, {20, 0, 20, 10}});
   const auto mosaic = open_mosaic(paths);
   std::filesystem::resize_file(paths[1], std::filesystem::file_size(paths[1]) - 7);
-  try {
-    static_cast<void>(read_whole(*mosaic));
-    FAIL() << "read";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kIo);
-    EXPECT_THAT(error.what(), HasSubstr("piece1.tif: was changed or replaced while it was read"));
-  }
+  const Error error = error_of([&] { (void)read_whole(*mosaic); });
+  EXPECT_EQ(error.code(), ErrorCode::kIo);
+  EXPECT_THAT(error.what(), HasSubstr("piece1.tif: was changed or replaced while it was read"));
   std::filesystem::remove(paths[1]);
   EXPECT_THROW(static_cast<void>(read_whole(*mosaic)), Error);
 }
