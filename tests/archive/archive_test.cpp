@@ -15,11 +15,8 @@
 namespace isohf {
 namespace {
 
+using test::small_grid;
 using test::TemporaryFolder;
-
-TileGrid small_grid() {
-  return TileGrid::make(TileShape::make(12, 11, 3), 5, 4, 100.0, 100.0);
-}
 
 TEST(Archive, BringsBackTilesMembersAndMetadata) {
   for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
@@ -43,8 +40,12 @@ TEST(Archive, BringsBackTilesMembersAndMetadata) {
   }
 }
 
+/// docs/reader.py was written from docs/archive_format.md; it compares content hashes.
+int read_by_page(const std::string& path) {
+  return std::system((R"(python3 ")" ISOHF_SOURCE_DIR R"(/docs/reader.py" )" + path).c_str());
+}
+
 TEST(Archive, IsReadByThePageAboutItsFormat) {
-  // docs/reader.py was written from docs/archive_format.md; it compares content hashes.
   if (std::system("command -v python3 >/dev/null 2>&1") != 0) GTEST_SKIP() << "python3 is not installed";
   const TemporaryFolder folder;
   const std::string path = folder / "a.isohf";
@@ -52,8 +53,7 @@ TEST(Archive, IsReadByThePageAboutItsFormat) {
     for (const CodeType type : {CodeType::kU16, CodeType::kU8, CodeType::kF32}) {
       std::filesystem::remove(path);
       test::make_archive(path, TileGrid::make(shape, 5, 4, 100.0, 1.0 / 3.0), type);
-      const std::string command = std::string("python3 \"" ISOHF_SOURCE_DIR "/docs/reader.py\" ") + path;
-      EXPECT_EQ(std::system(command.c_str()), 0) << to_string(type) << " " << shape.columns();
+      EXPECT_EQ(read_by_page(path), 0) << to_string(type) << " " << shape.columns();
     }
   }
 }
@@ -71,8 +71,7 @@ TEST(Archive, IsReadByThePageWithPayloadsOfEveryKind) {
         ArchiveWriter writer(path, grid, WriterOptions{});
         writer.add_tile(encode_tile(grid.shape(), codes, effort, version));
         static_cast<void>(writer.finish(test::make_metadata(grid, type)));
-        const std::string command = std::string("python3 \"" ISOHF_SOURCE_DIR "/docs/reader.py\" ") + path;
-        EXPECT_EQ(std::system(command.c_str()), 0) << to_string(type) << ", level " << level_of(effort);
+        EXPECT_EQ(read_by_page(path), 0) << to_string(type) << ", level " << level_of(effort);
       }
     }
   }

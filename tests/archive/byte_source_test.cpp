@@ -19,6 +19,7 @@ namespace isohf {
 namespace {
 
 using test::error_of;
+using test::small_grid;
 using testing::HasSubstr;
 
 std::vector<std::byte> archive_bytes(const TileGrid& grid) {
@@ -27,9 +28,6 @@ std::vector<std::byte> archive_bytes(const TileGrid& grid) {
   return test::read_bytes(folder / "a.isohf");
 }
 
-TileGrid small_grid() {
-  return TileGrid::make(TileShape::make(12, 11, 3), 5, 4, 100.0, 100.0);
-}
 /// More tiles than opening sees of the file's end.
 TileGrid large_grid() {
   return TileGrid::make(TileShape::make(5, 5, 1), 160, 60, 100.0, 100.0);

@@ -22,16 +22,13 @@
 namespace isohf {
 namespace {
 
+using test::small_grid;
 using test::TemporaryFolder;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
 WriterOptions plain() {
   return {false, false, "", {4, 2}};
-}
-
-TileGrid small_grid() {
-  return TileGrid::make(TileShape::make(12, 11, 3), 5, 4, 100.0, 100.0);
 }
 
 EncodedTile tile_at(const TileGrid& grid, std::int64_t flat) {

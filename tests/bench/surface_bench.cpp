@@ -1,9 +1,8 @@
-// Bandwidth of what stands between a raster's samples and a tile's residuals, and after it, beside memcpy and
-// libdeflate on the same terrain. Bytes are those that go in: 2 a sample of 16 bits, 4 a height. usage: surface_bench
-// [--benchmark_filter=REGEX] [--benchmark_...]
+// Bandwidth of what stands between a raster's samples and a tile's codes, and of shading, beside memcpy on the same
+// terrain; kernels_bench has the tile codec. Bytes are those that go in: 2 a sample of 16 bits, 4 a height. usage:
+// surface_bench [--benchmark_filter=REGEX] [--benchmark_...]
 
 #include <benchmark/benchmark.h>
-#include <libdeflate.h>
 
 #include <cmath>
 #include <cstring>
@@ -12,10 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "isohf/archive/container/content_hash.h"
-#include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/tile/quantise.h"
-#include "isohf/archive/tile/tile_encoder.h"
 #include "isohf/base/sample.h"
 #include "isohf/light/normals.h"
 #include "isohf/light/shadow_hull.h"
@@ -103,19 +99,6 @@ void memcpy_of_samples(benchmark::State& state) {
 }
 BENCHMARK(memcpy_of_samples);
 
-void libdeflate_of_codes(benchmark::State& state) {
-  const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
-      libdeflate_alloc_compressor(static_cast<int>(state.range(0))), libdeflate_free_compressor);
-  const std::span<const std::byte> bytes = code_bytes();
-  std::vector<std::byte> out(libdeflate_deflate_compress_bound(compressor.get(), bytes.size()));
-  for (auto _ : state) {
-    benchmark::DoNotOptimize(
-        libdeflate_deflate_compress(compressor.get(), bytes.data(), bytes.size(), out.data(), out.size()));
-  }
-  set_bytes(state, bytes.size());
-}
-BENCHMARK(libdeflate_of_codes)->Arg(1)->Arg(6)->ArgName("level");
-
 void scan(benchmark::State& state) {
   for (auto _ : state) {
     SourceScan found;
@@ -125,19 +108,6 @@ void scan(benchmark::State& state) {
   set_bytes(state, stages().raw.size());
 }
 BENCHMARK(scan);
-
-void heights_of_samples(benchmark::State& state) {
-  SourceInfo info = stages().info;
-  if (state.range(0) != 0) info.void_values = {-32768.0};
-  std::vector<float> out(stages().heights.size());
-  for (auto _ : state) {
-    heights_from_samples(info, 0.0, stages().raw, out);
-    benchmark::DoNotOptimize(out.data());
-    benchmark::ClobberMemory();
-  }
-  set_bytes(state, stages().raw.size());
-}
-BENCHMARK(heights_of_samples)->Arg(0)->Arg(1)->ArgName("voids");
 
 constexpr Filter kFilters[] = {Filter::kNearest, Filter::kBilinear, Filter::kLimitedCubic, Filter::kBspline3};
 
@@ -178,34 +148,6 @@ void cut_tile(benchmark::State& state) {
   state.SetLabel(to_string(kFilters[state.range(0)]));
 }
 BENCHMARK(cut_tile)->DenseRange(0, 3);
-
-void quantise_tile(benchmark::State& state) {
-  TileCodes codes;
-  for (auto _ : state) benchmark::DoNotOptimize(quantise(stages().quantisation, 0.0, stages().tile, codes));
-  set_bytes(state, stages().tile.size() * sizeof(float));
-}
-BENCHMARK(quantise_tile);
-
-void encode(benchmark::State& state) {
-  for (auto _ : state) {
-    const EncodedTile encoded = encode_tile(stages().grid.shape(), stages().codes);
-    benchmark::DoNotOptimize(encoded.deflated.data());
-  }
-  set_bytes(state, code_bytes().size());
-}
-BENCHMARK(encode);
-
-void digest(benchmark::State& state) {
-  for (auto _ : state) benchmark::DoNotOptimize(tile_content_digest(stages().codes).data());
-  set_bytes(state, code_bytes().size());
-}
-BENCHMARK(digest);
-
-void crc(benchmark::State& state) {
-  for (auto _ : state) benchmark::DoNotOptimize(crc32(code_bytes()));
-  set_bytes(state, code_bytes().size());
-}
-BENCHMARK(crc);
 
 void normals(benchmark::State& state) {
   std::vector<Normal> out(stages().tile.size());

@@ -19,25 +19,12 @@
 namespace isohf {
 namespace {
 
+using test::decoded_by;
 using test::Kind;
 
 std::vector<std::byte> adaptive_payload(const TileShape& shape, const TileCodes& tile,
                                         Effort effort = Effort::kDefault) {
-  const EncodedTile encoded = encode_tile(shape, tile, effort, PayloadVersion::kAdaptive);
-  std::vector<std::byte> payload(encoded.payload_bytes);
-  inflate_exactly(encoded.deflated, payload);
-  return payload;
-}
-
-/// The tile, or nothing where it is refused.
-template <typename Decode>
-std::optional<TileCodes> decoded_by(const Decode& decode, const TileShape& shape, CodeType type,
-                                    std::span<const std::byte> payload) {
-  try {
-    return decode(shape, type, payload);
-  } catch (const Error&) {
-    return std::nullopt;
-  }
+  return test::payload_of(encode_tile(shape, tile, effort, PayloadVersion::kAdaptive));
 }
 
 TEST(AdaptiveCodec, BringsBackEveryTileByBothDecodersWithAndWithoutSimd) {

@@ -86,8 +86,7 @@ TEST(PairCoding, MakesTilesOfLittleDoubtSmaller) {
     tile.codes.push_back(static_cast<std::uint16_t>(1000 + (random() % 8 == 0 ? 1 : 0)));
   }
   const EncodedTile encoded = encode_tile(shape, tile, Effort::kDefault, PayloadVersion::kFirst);
-  std::vector<std::byte> payload(encoded.payload_bytes);
-  inflate_exactly(encoded.deflated, payload);
+  const std::vector<std::byte> payload = test::payload_of(encoded);
   ByteReader reader(payload);
   EXPECT_NE(read_payload_header(shape, CodeType::kU16, reader).paired, 0);
   EXPECT_LT(8.0 * static_cast<double>(encoded.deflated.size()), 0.95 * static_cast<double>(tile.codes.size()));

@@ -55,8 +55,7 @@ TEST_F(Simd, DecodesTilesToTheSameSamples) {
     for (const test::Kind kind : test::kAllKinds) {
       const EncodedTile encoded = encode_tile(shape, test::make_tile(shape, type, kind, 9));
       if (encoded.is_empty) continue;
-      std::vector<std::byte> payload(encoded.payload_bytes);
-      inflate_exactly(encoded.deflated, payload);
+      const std::vector<std::byte> payload = test::payload_of(encoded);
       const TileCodes wide = decode_tile(shape, type, payload);
       const PlainTwins plain_twins;
       EXPECT_TRUE(test::same_samples(wide, decode_tile(shape, type, payload)));

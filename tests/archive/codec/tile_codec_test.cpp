@@ -18,18 +18,13 @@ namespace isohf {
 namespace {
 
 using test::Kind;
+using test::payload_of;
 
 constexpr CodeType kAllTypes[] = {CodeType::kU16, CodeType::kU8, CodeType::kF32};
 
 std::vector<TileShape> shapes() {
   return {TileShape::make(5, 5, 1),   TileShape::make(6, 5, 1),   TileShape::make(5, 7, 1),  TileShape::make(12, 11, 3),
           TileShape::make(24, 29, 1), TileShape::make(52, 67, 4), TileShape::make(300, 9, 1)};
-}
-
-std::vector<std::byte> payload_of(const EncodedTile& tile) {
-  std::vector<std::byte> payload(tile.payload_bytes);
-  inflate_exactly(tile.deflated, payload);
-  return payload;
 }
 
 TEST(TileCodec, BringsBackEverySampleOfEveryKindOfTile) {

@@ -3,35 +3,19 @@
 
 #include <gtest/gtest.h>
 
-#include <optional>
 #include <random>
 
 #include "archive/tile/tiles.h"
-#include "isohf/archive/deflate/deflate.h"
-#include "isohf/error.h"
 
 namespace isohf {
 namespace {
 
+using test::decoded_by;
 using test::Kind;
 
 std::vector<std::byte> payload_of(const TileShape& shape, CodeType type, Kind kind, std::uint32_t seed) {
-  const EncodedTile tile =
-      encode_tile(shape, test::make_tile(shape, type, kind, seed), Effort::kDefault, PayloadVersion::kFirst);
-  std::vector<std::byte> payload(tile.payload_bytes);
-  inflate_exactly(tile.deflated, payload);
-  return payload;
-}
-
-/// The tile, or nothing where the payload is refused.
-using DecodeTile = TileCodes (*)(const TileShape&, CodeType, std::span<const std::byte>);
-std::optional<TileCodes> made_by(DecodeTile decode, const TileShape& shape, CodeType type,
-                                 std::span<const std::byte> payload) {
-  try {
-    return decode(shape, type, payload);
-  } catch (const Error&) {
-    return std::nullopt;
-  }
+  return test::payload_of(
+      encode_tile(shape, test::make_tile(shape, type, kind, seed), Effort::kDefault, PayloadVersion::kFirst));
 }
 
 TEST(TileDecoder, GivesWhatThePlainDecoderGives) {
@@ -58,13 +42,13 @@ TEST(TileDecoder, RefusesWhatThePlainDecoderRefuses) {
       std::vector<std::byte> broken = payload_of(shape, type, kind, 2);
       for (std::size_t bit = 0; bit < 8 * broken.size(); ++bit) {
         broken[bit / 8] ^= static_cast<std::byte>(1U << bit % 8);
-        ASSERT_EQ(made_by(decode_tile, shape, type, broken), made_by(decode_tile_slowly, shape, type, broken))
+        ASSERT_EQ(decoded_by(decode_tile, shape, type, broken), decoded_by(decode_tile_slowly, shape, type, broken))
             << "bit " << bit;
         broken[bit / 8] ^= static_cast<std::byte>(1U << bit % 8);
       }
       while (!broken.empty()) {
         broken.pop_back();
-        ASSERT_FALSE(made_by(decode_tile, shape, type, broken).has_value()) << broken.size();
+        ASSERT_FALSE(decoded_by(decode_tile, shape, type, broken).has_value()) << broken.size();
       }
     }
   }
@@ -79,8 +63,8 @@ TEST(TileDecoder, SurvivesNoiseBehindAValidHeader) {
     for (std::size_t i = random() % payload.size(); i < payload.size(); ++i) {
       payload[i] = static_cast<std::byte>(random());
     }
-    ASSERT_EQ(made_by(decode_tile, shape, CodeType::kU16, payload),
-              made_by(decode_tile_slowly, shape, CodeType::kU16, payload));
+    ASSERT_EQ(decoded_by(decode_tile, shape, CodeType::kU16, payload),
+              decoded_by(decode_tile_slowly, shape, CodeType::kU16, payload));
   }
 }
 

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-#include "isohf/archive/tile/tile_encoder.h"
+#include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/writer.h"
 
 namespace isohf::test {
@@ -65,6 +65,16 @@ TileCodes make_tile(const TileShape& shape, CodeType type, Kind kind, std::uint3
     }
   }
   return tile;
+}
+
+std::vector<std::byte> payload_of(const EncodedTile& tile) {
+  std::vector<std::byte> payload(tile.payload_bytes);
+  inflate_exactly(tile.deflated, payload);
+  return payload;
+}
+
+TileGrid small_grid() {
+  return TileGrid::make(TileShape::make(12, 11, 3), 5, 4, 100.0, 100.0);
 }
 
 bool same_samples(const TileCodes& a, const TileCodes& b) {
