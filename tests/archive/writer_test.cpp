@@ -17,6 +17,7 @@
 #include "isohf/archive/tile/tile_codes.h"
 #include "isohf/error.h"
 #include "support/error_of.h"
+#include "support/in_folder.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -81,9 +82,12 @@ ErrorCode code_of(const std::function<void()>& deed, const std::string& part_of_
   return error.code();
 }
 
-TEST(ArchiveWriter, RefusesTargetsThatItMustNotWrite) {
-  const TemporaryFolder folder;
+class ArchiveWriting : public test::InFolder {
+ protected:
   const TileGrid grid = small_grid();
+};
+
+TEST_F(ArchiveWriting, RefusesTargetsThatItMustNotWrite) {
   const auto open = [&](const std::string& path) { return opening(path, grid, {}); };
   test::write_file(folder / "there", "x");
   EXPECT_EQ(code_of(open(folder / "there"), "is no isohf archive"), ErrorCode::kInvalidArgument);
@@ -94,9 +98,7 @@ TEST(ArchiveWriter, RefusesTargetsThatItMustNotWrite) {
   EXPECT_EQ(test::read_bytes(folder / "there").size(), 1U);
 }
 
-TEST(ArchiveWriter, LeavesNothingWhereItIsNotFinished) {
-  const TemporaryFolder folder;
-  const TileGrid grid = small_grid();
+TEST_F(ArchiveWriting, LeavesNothingWhereItIsNotFinished) {
   {
     ArchiveWriter writer(folder / "a", grid, plain());
     add_tiles(writer, grid, 7);
@@ -105,9 +107,7 @@ TEST(ArchiveWriter, LeavesNothingWhereItIsNotFinished) {
   EXPECT_THAT(folder.names(), ElementsAre());
 }
 
-TEST(ArchiveWriter, LetsOneProcessWriteATarget) {
-  const TemporaryFolder folder;
-  const TileGrid grid = small_grid();
+TEST_F(ArchiveWriting, LetsOneProcessWriteATarget) {
   ArchiveWriter writer(folder / "a", grid, plain());
   for (const bool resume : {false, true}) {
     EXPECT_EQ(code_of(opening(folder / "a", grid, {true, resume, "", kPlanes}), "another process"), ErrorCode::kIo);
@@ -116,9 +116,7 @@ TEST(ArchiveWriter, LetsOneProcessWriteATarget) {
   EXPECT_EQ(ArchiveReader(folder / "a").check_structure(), std::vector<std::string>{});
 }
 
-TEST(ArchiveWriter, KeepsWhatSomebodyElseMadeMeanwhile) {
-  const TemporaryFolder folder;
-  const TileGrid grid = small_grid();
+TEST_F(ArchiveWriting, KeepsWhatSomebodyElseMadeMeanwhile) {
   {
     ArchiveWriter writer(folder / "a", grid, plain());
     test::write_file(folder / "a", "x");
@@ -128,9 +126,7 @@ TEST(ArchiveWriter, KeepsWhatSomebodyElseMadeMeanwhile) {
   EXPECT_EQ(ArchiveReader(folder / "a.part").check_structure(), std::vector<std::string>{});
 }
 
-TEST(ArchiveWriter, ReplacesWhereItMay) {
-  const TemporaryFolder folder;
-  const TileGrid grid = small_grid();
+TEST_F(ArchiveWriting, ReplacesWhereItMay) {
   test::write_file(folder / "a", "");
   for (int time = 0; time < 2; ++time) {  // an empty file, then an archive
     ArchiveWriter writer(folder / "a", grid, {true, false, "", kPlanes});
@@ -147,9 +143,8 @@ TEST(ArchiveWriter, ReplacesWhereItMay) {
   }
 }
 
-TEST(ArchiveWriter, RefusesMembersWithBadOrTakenNames) {
-  const TemporaryFolder folder;
-  ArchiveWriter writer(folder / "a", small_grid(), {});
+TEST_F(ArchiveWriting, RefusesMembersWithBadOrTakenNames) {
+  ArchiveWriter writer(folder / "a", grid, {});
   writer.add_member("good", {}, false);
   for (const char* name : {"", "/a", "a/", "..", "a/../b", "./a", "a//b", "a\\b", "c:a", "a\nb", "good", "isohf.json",
                            "index.bin", "tiles/0/0.tile"}) {
@@ -294,10 +289,9 @@ TEST_F(Resume, GoesOnAfterAKill) {
   static_cast<void>(go_on());
 }
 
-TEST(ArchiveWriter, SaysThatTheDiskIsFullAndLeavesNothing) {
+TEST_F(ArchiveWriting, SaysThatTheDiskIsFullAndLeavesNothing) {
   // A limit on file sizes fails writes as a full disk does, without needing one.
-  const TemporaryFolder folder;
-  const TileGrid grid = TileGrid::make(TileShape::make(212, 243, 4), 40, 4, 1.0, 1.0);
+  const TileGrid large = TileGrid::make(TileShape::make(212, 243, 4), 40, 4, 1.0, 1.0);
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
@@ -306,10 +300,10 @@ TEST(ArchiveWriter, SaysThatTheDiskIsFullAndLeavesNothing) {
     ::setrlimit(RLIMIT_FSIZE, &limit);
     int result = 1;
     try {
-      ArchiveWriter writer(folder / "a", grid, plain());
+      ArchiveWriter writer(folder / "a", large, plain());
       const EncodedTile tile =
-          encode_tile(grid.shape(), test::make_tile(grid.shape(), CodeType::kU16, test::Kind::kNoise, 1));
-      while (writer.next_tile() < grid.tile_count()) writer.add_tile(tile);
+          encode_tile(large.shape(), test::make_tile(large.shape(), CodeType::kU16, test::Kind::kNoise, 1));
+      while (writer.next_tile() < large.tile_count()) writer.add_tile(tile);
     } catch (const Error& error) {
       const std::string message = error.what();
       const bool is_clear = message.find("/a: cannot write") != std::string::npos &&

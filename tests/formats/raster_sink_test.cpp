@@ -17,6 +17,7 @@
 #include "formats/registry.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "support/in_folder.h"
 #include "support/rasters/place_at.h"
 #include "support/rasters/raster.h"
 #include "support/rasters/samples.h"
@@ -86,8 +87,9 @@ bool can_store(const std::string& extension, SampleType type) {
   return true;
 }
 
-TEST(RasterSink, RoundTripsEverySampleTypeAndChannel) {
-  const TemporaryFolder folder;
+using RasterSink = InFolder;
+
+TEST_F(RasterSink, RoundTripsEverySampleTypeAndChannel) {
   for (const std::string extension : {".tif", ".TIFF", ".exr", ".png"}) {
     for (const SampleType type : kAllTypes) {
       if (!can_store(extension, type)) continue;
@@ -115,8 +117,7 @@ TEST(RasterSink, RoundTripsEverySampleTypeAndChannel) {
   }
 }
 
-TEST(RasterSink, RoundTripsManyStripsAndLongRows) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, RoundTripsManyStripsAndLongRows) {
   for (const auto& [width, height] : {std::pair{3000, 400}, {200000, 3}, {1, 5000}}) {
     for (const std::string extension : {".tif", ".exr"}) {
       const RasterSpec spec = spec_of(width, height, SampleType::kFloat32);
@@ -144,8 +145,7 @@ std::vector<double> values_or_nan(HeightSource& source) {
   return values;
 }
 
-TEST(RasterSink, GridsAndPlainSamplesReadBackWithPlaceAndVoids) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, GridsAndPlainSamplesReadBackWithPlaceAndVoids) {
   int round = 0;
   for (const std::string extension : {".asc", ".flt", ".r16", ".r32", ".raw", ".npy"}) {
     for (const double spacing_y : {10.0, 12.5}) {
@@ -220,8 +220,7 @@ TEST(RasterSink, GridsAndPlainSamplesReadBackWithPlaceAndVoids) {
   }
 }
 
-TEST(RasterSink, WritesSidecarsWithTheRasterOrNotAtAll) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, WritesSidecarsWithTheRasterOrNotAtAll) {
   const RasterSpec spec = placed(6, 4, SampleType::kFloat32, 10.0);
   { const auto abandoned = create_raster(folder / "a.flt", spec); }
   EXPECT_TRUE(std::filesystem::is_empty(folder / "."));
@@ -246,8 +245,7 @@ TEST(RasterSink, WritesSidecarsWithTheRasterOrNotAtAll) {
   EXPECT_EQ(json.at("crs_epsg"), 32632);
 }
 
-TEST(RasterSink, RefusesADescriptionThatIsWrong) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, RefusesADescriptionThatIsWrong) {
   const std::string path = folder / "a.r16";
   const std::string good = R"({"width": 2, "height": 2, "sample_type": "uint16", "byte_order": "little")";
   const auto says = [&](const std::string& json) {
@@ -270,8 +268,7 @@ TEST(RasterSink, RefusesADescriptionThatIsWrong) {
               HasSubstr("the file has 8 bytes"));
 }
 
-TEST(RasterSink, BeginsBigTiffWhereClassicTiffEnds) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, BeginsBigTiffWhereClassicTiffEnds) {
   for (const auto& [side, magic] : {std::pair{1000, 42}, {40000, 43}}) {
     const auto sink = create_raster(folder / "large.tif", spec_of(side, side, SampleType::kFloat32));
     const std::string head = read_file(folder / "large.tif.part");
@@ -280,8 +277,7 @@ TEST(RasterSink, BeginsBigTiffWhereClassicTiffEnds) {
   }
 }
 
-TEST(RasterSink, WritesHgtTilesOfTheSizesThatExist) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, WritesHgtTilesOfTheSizesThatExist) {
   const RasterSpec spec = spec_of(1201, 1201, SampleType::kInt16);
   const auto samples = noise(spec);
   const std::string path = folder / "N44E006.hgt";
@@ -298,8 +294,7 @@ TEST(RasterSink, WritesHgtTilesOfTheSizesThatExist) {
             ErrorCode::kInvalidArgument);
 }
 
-TEST(RasterSink, KeepsVoidScaleAndUnitInTiff) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, KeepsVoidScaleAndUnitInTiff) {
   const std::string path = folder / "void.tif";
   for (const auto& [type, value] : {std::pair{SampleType::kInt16, -32768.0},
                                     {SampleType::kFloat32, static_cast<double>(-3.4028235e38F)},
@@ -322,8 +317,7 @@ TEST(RasterSink, KeepsVoidScaleAndUnitInTiff) {
   }
 }
 
-TEST(RasterSink, KeepsTransparentGrayInPng) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, KeepsTransparentGrayInPng) {
   const std::string path = folder / "void.png";
   RasterSpec spec = spec_of(5, 4, SampleType::kUint16);
   spec.void_value = 65535.0;
@@ -333,8 +327,7 @@ TEST(RasterSink, KeepsTransparentGrayInPng) {
   EXPECT_EQ(error_of([&] { (void)create_raster(folder / "no.png", spec); }).code(), ErrorCode::kInvalidArgument);
 }
 
-TEST(RasterSink, LeavesNothingBehindUnlessFinished) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, LeavesNothingBehindUnlessFinished) {
   for (const char* extension : {".tif", ".exr", ".png"}) {
     const std::string path = folder / (std::string("half") + extension);
     const RasterSpec spec =
@@ -354,8 +347,7 @@ TEST(RasterSink, LeavesNothingBehindUnlessFinished) {
   }
 }
 
-TEST(RasterSink, ReplacesAFileOnlyWhenTold) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, ReplacesAFileOnlyWhenTold) {
   const std::string path = folder / "here.tif";
   RasterSpec spec = spec_of(4, 4, SampleType::kInt16);
   write(path, spec, noise(spec), 4);
@@ -372,8 +364,7 @@ TEST(RasterSink, ReplacesAFileOnlyWhenTold) {
   EXPECT_EQ(open_raster(path, {})->info().width, 5);
 }
 
-TEST(RasterSink, RefusesWhatItCannotWriteAndLeavesNothing) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, RefusesWhatItCannotWriteAndLeavesNothing) {
   const RasterSpec good = spec_of(4, 4, SampleType::kFloat32);
   Error error = error_of([&] { (void)create_raster(folder / "a.jpg", good); });
   EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
@@ -394,8 +385,7 @@ TEST(RasterSink, RefusesWhatItCannotWriteAndLeavesNothing) {
   EXPECT_EQ(left, 1);
 }
 
-TEST(RasterSink, ReplacesOnlyItsOwnKind) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, ReplacesOnlyItsOwnKind) {
   RasterSpec spec = placed(6, 4, SampleType::kFloat32, 10.0);
   spec.overwrite = true;
   const auto refused = [&](const std::string& name, const std::string& old, const std::string& raster) {
@@ -449,8 +439,7 @@ class FileSizeLimit {
   void (*handler_)(int) = nullptr;
 };
 
-TEST(RasterSink, ReportsADiskThatIsFull) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, ReportsADiskThatIsFull) {
   for (const std::string name : {"full.tif", "full.exr", "full.png", "N00E000.hgt", "full.asc", "full.npy"}) {
     const RasterSpec spec = spec_of(1201, 1201,
                                     name == "full.exr"   ? SampleType::kFloat32
@@ -473,8 +462,7 @@ TEST(RasterSink, ReportsADiskThatIsFull) {
   }
 }
 
-TEST(RasterSink, RefusesWhatNoDiskHasRoomForAndLeavesNothing) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, RefusesWhatNoDiskHasRoomForAndLeavesNothing) {
   constexpr std::int64_t kSide = std::numeric_limits<std::int32_t>::max();
   for (const std::string name : {"a.npy", "a.flt", "a.r32", "a.asc", "a.tif", "a.exr"}) {
     for (const bool compress : {false, true}) {
@@ -493,8 +481,7 @@ TEST(RasterSink, RefusesWhatNoDiskHasRoomForAndLeavesNothing) {
   EXPECT_EQ(error_of([&] { check_raster_room(folder / "a.r32", spec, std::int64_t{1} << 60); }).code(), ErrorCode::kIo);
 }
 
-TEST(RasterSink, NeverLeavesOldSamplesBesideANewDescription) {
-  const TemporaryFolder folder;
+TEST_F(RasterSink, NeverLeavesOldSamplesBesideANewDescription) {
   RasterSpec spec = spec_of(6, 4, SampleType::kUint16);
   const auto samples = noise(spec);
   write(folder / "a.r16", spec, samples, 4);

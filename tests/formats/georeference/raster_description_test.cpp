@@ -14,6 +14,7 @@
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "support/in_folder.h"
 #include "support/rasters/place_at.h"
 #include "support/rasters/raster.h"
 #include "support/rasters/samples.h"
@@ -53,9 +54,12 @@ std::vector<float> elevations_of(HeightSource& source) {
   return elevations;
 }
 
-TEST(RasterDescription, GivesAPngPlaceAndMeaning) {
-  const TemporaryFolder folder;
+class RasterDescription : public InFolder {
+ protected:
   const std::string path = folder / "a.png";
+};
+
+TEST_F(RasterDescription, GivesAPngPlaceAndMeaning) {
   write_picture(path);
   const auto source = open_raster(path, {});
   const SourceInfo& info = source->info();
@@ -78,8 +82,7 @@ TEST(RasterDescription, GivesAPngPlaceAndMeaning) {
   EXPECT_TRUE(std::isnan(found[3]));
 }
 
-TEST(RasterDescription, KeepsWhatHeightsAreAbove) {
-  const TemporaryFolder folder;
+TEST_F(RasterDescription, KeepsWhatHeightsAreAbove) {
   RasterSpec spec = picture_spec();
   const std::uint16_t codes[] = {0, 100, 65535, 7};
   for (const std::optional<int> code : {std::optional(5703), std::optional<int>()}) {
@@ -93,8 +96,7 @@ TEST(RasterDescription, KeepsWhatHeightsAreAbove) {
   }
 }
 
-TEST(RasterDescription, OfRowsInAnotherOrderIsRefused) {
-  const TemporaryFolder folder;
+TEST_F(RasterDescription, OfRowsInAnotherOrderIsRefused) {
   write_picture(folder / "a.png");
   std::string text = read_file(folder / "a.png.json");
   const std::string order = "north to south";
@@ -104,9 +106,7 @@ TEST(RasterDescription, OfRowsInAnotherOrderIsRefused) {
               HasSubstr("row_order is south to north"));
 }
 
-TEST(RasterDescription, IsOverruledByTheUser) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "a.png";
+TEST_F(RasterDescription, IsOverruledByTheUser) {
   write_picture(path);
   OpenOptions options;
   options.z_scale = 1.0;
@@ -121,9 +121,7 @@ TEST(RasterDescription, IsOverruledByTheUser) {
   EXPECT_EQ(found[3], 7.0F);
 }
 
-TEST(RasterDescription, OfAnotherProgramIsLeftAsideWithAWarning) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "a.png";
+TEST_F(RasterDescription, OfAnotherProgramIsLeftAsideWithAWarning) {
   write_picture(path);
   std::filesystem::remove(path + ".json");
   std::filesystem::remove(path + ".aux.xml");  // which says the same in GDAL's words
@@ -135,9 +133,7 @@ TEST(RasterDescription, OfAnotherProgramIsLeftAsideWithAWarning) {
   EXPECT_THAT(source->info().warnings.front(), HasSubstr("names no format"));
 }
 
-TEST(RasterDescription, IsRefusedWhereItIsDamaged) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "a.png";
+TEST_F(RasterDescription, IsRefusedWhereItIsDamaged) {
   write_picture(path);
   std::ifstream in(path + ".json");
   const std::string good{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};

@@ -9,6 +9,7 @@
 #include "formats/reader_failure.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "support/in_folder.h"
 #include "support/rasters/every_window.h"
 #include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
@@ -53,8 +54,9 @@ TEST(RawLayout, IsReadFromItsText) {
   }
 }
 
-TEST(RawSource, ReadsEveryTypeInBothByteOrders) {
-  const TemporaryFolder folder;
+using RawSource = InFolder;
+
+TEST_F(RawSource, ReadsEveryTypeInBothByteOrders) {
   constexpr std::array<std::pair<const char*, SampleType>, 8> kTypes = {{{"u8", SampleType::kUint8},
                                                                          {"i8", SampleType::kInt8},
                                                                          {"u16", SampleType::kUint16},
@@ -82,8 +84,7 @@ TEST(RawSource, ReadsEveryTypeInBothByteOrders) {
   }
 }
 
-TEST(RawSource, SaysWhenTheOtherByteOrderIsFarSmoother) {
-  const TemporaryFolder folder;
+TEST_F(RawSource, SaysWhenTheOtherByteOrderIsFarSmoother) {
   std::string hills;
   std::string noise;
   std::string terraces;
@@ -117,8 +118,7 @@ TEST(RawSource, SaysWhenTheOtherByteOrderIsFarSmoother) {
   }
 }
 
-TEST(RawSource, WantsExactlyTheBytesOfItsLayout) {
-  const TemporaryFolder folder;
+TEST_F(RawSource, WantsExactlyTheBytesOfItsLayout) {
   for (std::size_t bytes = 1; bytes < 30; ++bytes) {
     const std::string path = write(folder, "terrain.r16", bytes);
     if (bytes == 24) {
@@ -132,8 +132,7 @@ TEST(RawSource, WantsExactlyTheBytesOfItsLayout) {
   }
 }
 
-TEST(RawSource, AsksForALayoutByName) {
-  const TemporaryFolder folder;
+TEST_F(RawSource, AsksForALayoutByName) {
   const auto what = [&](const std::string& name, std::size_t bytes) {
     const Error error = error_of([&] { (void)open_raster(write(folder, name, bytes), {}); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
@@ -148,8 +147,7 @@ TEST(RawSource, AsksForALayoutByName) {
   EXPECT_THAT(what("a.r16", 20), Not(HasSubstr("\n")));
 }
 
-TEST(RawSource, GoesBeforeNameAndContent) {
-  const TemporaryFolder folder;
+TEST_F(RawSource, GoesBeforeNameAndContent) {
   write_file(folder / "a.png", "\x89PNG\r\n\x1A\n");
   EXPECT_EQ(open_raster(folder / "a.png", raw("2x2:u16be"))->info().format, "raw samples");
   OpenOptions channel = raw("2x2:u16be");
@@ -157,8 +155,7 @@ TEST(RawSource, GoesBeforeNameAndContent) {
   EXPECT_EQ(error_of([&] { (void)open_raster(folder / "a.png", channel); }).code(), ErrorCode::kInvalidArgument);
 }
 
-TEST(RawSource, TakesFloatsBeyondAnyHeightAsVoid) {
-  const TemporaryFolder folder;
+TEST_F(RawSource, TakesFloatsBeyondAnyHeightAsVoid) {
   const std::array<float, 4> samples = {1.0F, -3.4e38F, NAN, 8848.0F};
   write_file(folder / "a.f32", std::as_bytes(std::span(samples)));
   const auto source = open_raster(folder / "a.f32", raw("4x1:f32le"));

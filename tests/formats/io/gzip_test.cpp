@@ -10,6 +10,7 @@
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "isohf/raster.h"
+#include "support/in_folder.h"
 #include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
@@ -108,8 +109,9 @@ TEST_F(PackedTile, SaysWhenItWasChangedWhileItWasRead) {
   EXPECT_THAT(error.what(), HasSubstr("N44E006.hgt.gz: gzip data: ends early"));
 }
 
-TEST(Gzip, ReadsATileOfSeveralMegabytesInAnyOrder) {
-  const TemporaryFolder folder;
+using Gzip = InFolder;
+
+TEST_F(Gzip, ReadsATileOfSeveralMegabytesInAnyOrder) {
   const std::string plain_path = folder / "N44E006.hgt";
   const std::string contents = terrain(std::size_t{1201} * 1201 * 2);
   write_file(plain_path, contents);
@@ -130,8 +132,7 @@ TEST(Gzip, ReadsATileOfSeveralMegabytesInAnyOrder) {
   EXPECT_EQ(read_whole(*packed), read_whole(*plain));
 }
 
-TEST(Gzip, HoldsTextGridsWithTheirPrj) {
-  const TemporaryFolder folder;
+TEST_F(Gzip, HoldsTextGridsWithTheirPrj) {
   write_file(folder / "a.asc.gz", gzipped("ncols 2\nnrows 2\nxllcorner 5\nyllcorner 6\ncellsize 1\n1 2\n3 4\n"));
   write_file(folder / "a.prj", R"(PROJCS["Here",GEOGCS["G",DATUM["D",SPHEROID["S",6378137,298]]],UNIT["metre",1]])");
   const auto source = open_raster(folder / "a.asc.gz", {});
@@ -142,8 +143,7 @@ TEST(Gzip, HoldsTextGridsWithTheirPrj) {
   EXPECT_EQ(read_window(*source, {0, 0, 1, 1}), std::vector<std::byte>(all.begin(), all.begin() + 4));
 }
 
-TEST(Gzip, JoinsMembersAndPassesPaddingOver) {
-  const TemporaryFolder folder;
+TEST_F(Gzip, JoinsMembersAndPassesPaddingOver) {
   write_file(folder / "a.gz", gzipped("first ") + gzipped("") + gzipped("second") + std::string(600, '\0'));
   for (const std::uint64_t held : {kMiB, std::uint64_t{0}}) {
     SCOPED_TRACE(held);
@@ -156,8 +156,7 @@ TEST(Gzip, JoinsMembersAndPassesPaddingOver) {
   }
 }
 
-TEST(Gzip, HoldsManyMembersWhoseSizeTogetherNoFieldSays) {
-  const TemporaryFolder folder;
+TEST_F(Gzip, HoldsManyMembersWhoseSizeTogetherNoFieldSays) {
   const std::string block = terrain(65280);  // as bgzip cuts them
   std::string packed;
   std::string contents;
@@ -177,8 +176,7 @@ TEST(Gzip, HoldsManyMembersWhoseSizeTogetherNoFieldSays) {
   }
 }
 
-TEST(Gzip, NeverHoldsMoreThanItsMost) {
-  const TemporaryFolder folder;
+TEST_F(Gzip, NeverHoldsMoreThanItsMost) {
   constexpr std::uint64_t kMost = RawFile::kMostHeldBytes;
   for (const std::uint64_t bytes : {kMost, kMost + 1}) {
     write_file(folder / "a.gz", gzipped(std::string(bytes, '\0')));
@@ -190,8 +188,7 @@ TEST(Gzip, NeverHoldsMoreThanItsMost) {
   }
 }
 
-TEST(Gzip, RefusesEveryTruncationAndEveryFlippedByteInTheSameWordsHeldAndNot) {
-  const TemporaryFolder folder;
+TEST_F(Gzip, RefusesEveryTruncationAndEveryFlippedByteInTheSameWordsHeldAndNot) {
   const std::string whole = gzipped(terrain(800));
   const std::string path = folder / "4.raw.gz";
   ErrorCode code = ErrorCode::kCancelled;
@@ -219,8 +216,7 @@ TEST(Gzip, RefusesEveryTruncationAndEveryFlippedByteInTheSameWordsHeldAndNot) {
   }
 }
 
-TEST(Gzip, SaysWhichFormatsItDoesNotReadInside) {
-  const TemporaryFolder folder;
+TEST_F(Gzip, SaysWhichFormatsItDoesNotReadInside) {
   const auto says = [&](const std::string& name, const std::string& contents) {
     write_file(folder / name, gzipped(contents));
     return std::string(error_of([&] { (void)open_raster(folder / name, {}); }).what());

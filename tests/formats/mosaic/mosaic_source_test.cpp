@@ -11,6 +11,7 @@
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/error_of.h"
+#include "support/in_folder.h"
 #include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
@@ -50,18 +51,20 @@ std::string why_refused(const std::vector<std::string>& paths, const OpenOptions
   return "not refused";
 }
 
-TEST(MosaicSource, PiecesGiveTheWholeBitForBitInEveryType) {
+using MosaicSource = InFolder;
+
+TEST_F(MosaicSource, PiecesGiveTheWholeBitForBitInEveryType) {
   for (const SampleType type : kAllTypes) {
     for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
       SCOPED_TRACE(to_string(type) + " " + to_string(registration));
-      const TemporaryFolder folder;
+      const TemporaryFolder own;
       const CutRaster raster = noise_raster(placed_spec(97, 61, type, registration));
-      raster.cut(folder / "whole.tif", {0, 0, 97, 61});
-      std::vector<std::string> paths = write_pieces(raster, folder / "", ragged_cut(97, 61, 5, 20));
+      raster.cut(own / "whole.tif", {0, 0, 97, 61});
+      std::vector<std::string> paths = write_pieces(raster, own / "", ragged_cut(97, 61, 5, 20));
       std::reverse(paths.begin(), paths.end());
       const auto mosaic = open_mosaic(paths);
       const SourceInfo& info = mosaic->info();
-      const SourceInfo original = open_raster(folder / "whole.tif", {})->info();
+      const SourceInfo original = open_raster(own / "whole.tif", {})->info();
       EXPECT_EQ(info.width, 97);
       EXPECT_EQ(info.height, 61);
       EXPECT_EQ(info.sample_type, type);
@@ -78,8 +81,7 @@ TEST(MosaicSource, PiecesGiveTheWholeBitForBitInEveryType) {
   }
 }
 
-TEST(MosaicSource, AnyWindowInAnyOrderIsThatOfTheWhole) {
-  const TemporaryFolder folder;
+TEST_F(MosaicSource, AnyWindowInAnyOrderIsThatOfTheWhole) {
   const CutRaster raster = noise_raster(placed_spec(150, 130, SampleType::kInt16, Registration::kArea));
   const auto mosaic = open_mosaic(write_pieces(raster, folder / "", ragged_cut(150, 130, 8, 30)));
   std::mt19937 random(3);
@@ -93,8 +95,7 @@ TEST(MosaicSource, AnyWindowInAnyOrderIsThatOfTheWhole) {
   }
 }
 
-TEST(MosaicSource, DegreeTilesShareTheirPosts) {
-  const TemporaryFolder folder;
+TEST_F(MosaicSource, DegreeTilesShareTheirPosts) {
   // 61 posts a degree; two by two tiles.
   const auto height = [](std::int64_t c, std::int64_t r) { return static_cast<int>(c * 7 + r * 131) % 3000 - 40; };
   for (int row = 0; row < 2; ++row) {
@@ -124,8 +125,7 @@ TEST(MosaicSource, DegreeTilesShareTheirPosts) {
   }
 }
 
-TEST(MosaicSource, BothSidesOfThe180thMeridianJoin) {
-  const TemporaryFolder folder;
+TEST_F(MosaicSource, BothSidesOfThe180thMeridianJoin) {
   for (const auto& [name, value] : {std::pair("N10E179.hgt", 1), std::pair("N10W180.hgt", 2)}) {
     std::string bytes;
     for (int i = 0; i < 11 * 11; ++i) bytes += {'\0', static_cast<char>(value)};
@@ -141,8 +141,7 @@ TEST(MosaicSource, BothSidesOfThe180thMeridianJoin) {
   EXPECT_EQ(at(found, *mosaic, 11, 5), 2.0);
 }
 
-TEST(MosaicSource, MissingTilesAreVoidAndNamed) {
-  const TemporaryFolder folder;
+TEST_F(MosaicSource, MissingTilesAreVoidAndNamed) {
   std::vector<std::string> paths;
   for (const char* name : {"N45E006.hgt", "N45E008.hgt", "N44E007.hgt", "N44E006.hgt"}) {
     std::string bytes;
@@ -161,8 +160,7 @@ TEST(MosaicSource, MissingTilesAreVoidAndNamed) {
   EXPECT_THAT(holes.describe(1), HasSubstr("2 of 6 tiles are missing (190 samples): N45E007 and 1 more"));
 }
 
-TEST(MosaicSource, GroundInNoFileOfARaggedCutIsCounted) {
-  const TemporaryFolder folder;
+TEST_F(MosaicSource, GroundInNoFileOfARaggedCutIsCounted) {
   RasterSpec spec = placed_spec(90, 70, SampleType::kInt16, Registration::kArea);
   spec.void_value = -9999.0;
   const CutRaster raster = raster_of<std::int16_t>(spec, [](auto c, auto r) { return c + 100 * r; });
@@ -193,8 +191,7 @@ TEST(MosaicSource, GroundInNoFileOfARaggedCutIsCounted) {
   EXPECT_THAT(mosaic->plan().holes.describe(5), HasSubstr("samples lie in no file, the first at x "));
 }
 
-TEST(MosaicSource, IntegersWithoutAVoidGetALargerTypeForGaps) {
-  const TemporaryFolder folder;
+TEST_F(MosaicSource, IntegersWithoutAVoidGetALargerTypeForGaps) {
   const CutRaster raster = noise_raster(placed_spec(30, 10, SampleType::kUint16, Registration::kArea));
   const auto mosaic = open_mosaic(write_pieces(raster, folder / "", {{0, 0, 10, 10}, {20, 0, 10, 10}}));
   EXPECT_EQ(mosaic->info().sample_type, SampleType::kInt32);
@@ -206,8 +203,7 @@ TEST(MosaicSource, IntegersWithoutAVoidGetALargerTypeForGaps) {
   }
 }
 
-TEST(MosaicSource, OverlapShowsTheLastOrTheFirstAndVoidsWhatLiesBelow) {
-  const TemporaryFolder folder;
+TEST_F(MosaicSource, OverlapShowsTheLastOrTheFirstAndVoidsWhatLiesBelow) {
   RasterSpec spec = placed_spec(20, 4, SampleType::kInt16, Registration::kArea);
   spec.void_value = -1.0;
   raster_of<std::int16_t>(spec, [](auto c, auto) {
@@ -230,8 +226,7 @@ TEST(MosaicSource, OverlapShowsTheLastOrTheFirstAndVoidsWhatLiesBelow) {
   }
 }
 
-TEST(MosaicSource, OriginsRoundedInTheFileAreSnappedAndSaid) {
-  const TemporaryFolder folder;
+TEST_F(MosaicSource, OriginsRoundedInTheFileAreSnappedAndSaid) {
   CutRaster raster = raster_of<float>(placed_spec(40, 10, SampleType::kFloat32, Registration::kArea),
                                       [](auto c, auto r) { return 0.25 * static_cast<double>(c + r); });
   raster.cut(folder / "a.tif", {0, 0, 20, 10});
@@ -249,8 +244,7 @@ TEST(MosaicSource, OriginsRoundedInTheFileAreSnappedAndSaid) {
   EXPECT_THAT(why, HasSubstr("resample"));
 }
 
-TEST(MosaicSource, AThousandthOfASampleIsRoundingAndNoLoss) {
-  const TemporaryFolder folder;
+TEST_F(MosaicSource, AThousandthOfASampleIsRoundingAndNoLoss) {
   CutRaster raster = raster_of<float>(placed_spec(40, 10, SampleType::kFloat32, Registration::kArea),
                                       [](auto c, auto) { return static_cast<double>(c); });
   raster.cut(folder / "a.tif", {0, 0, 20, 10});
@@ -261,8 +255,7 @@ TEST(MosaicSource, AThousandthOfASampleIsRoundingAndNoLoss) {
   EXPECT_EQ(warnings[0].kind, Warning::Kind::kNote);
 }
 
-TEST(MosaicSource, FilesThatDisagreeAreRefusedByName) {
-  const TemporaryFolder folder;
+TEST_F(MosaicSource, FilesThatDisagreeAreRefusedByName) {
   const RasterSpec spec = placed_spec(20, 10, SampleType::kFloat32, Registration::kArea);
   raster_of<float>(spec, [](auto, auto) { return 1.0; }).cut(folder / "a.tif", {0, 0, 10, 10});
   const auto refused = [&](const std::function<void(RasterSpec&)>& change) {
@@ -297,8 +290,7 @@ TEST(MosaicSource, FilesThatDisagreeAreRefusedByName) {
   EXPECT_THAT(why_refused({folder / "a.tif", folder / "none.tif"}), HasSubstr("none.tif: no such file"));
 }
 
-TEST(MosaicSource, HeightsAreNamedAlikeWhicheverFileComesFirst) {
-  const TemporaryFolder folder;
+TEST_F(MosaicSource, HeightsAreNamedAlikeWhicheverFileComesFirst) {
   RasterSpec spec = placed_spec(30, 10, SampleType::kFloat32, Registration::kArea);
   const auto cut = [&](const char* name, std::int64_t column, const char* datum, std::optional<int> code) {
     spec.georeference->system.vertical_datum = datum;
@@ -320,8 +312,7 @@ TEST(MosaicSource, HeightsAreNamedAlikeWhicheverFileComesFirst) {
   }
 }
 
-TEST(MosaicSource, AChangedOrBrokenMemberIsAnErrorThatNamesIt) {
-  const TemporaryFolder folder;
+TEST_F(MosaicSource, AChangedOrBrokenMemberIsAnErrorThatNamesIt) {
   const CutRaster raster = noise_raster(placed_spec(40, 10, SampleType::kInt16, Registration::kArea));
   const std::vector<std::string> paths = write_pieces(raster, folder / "", {{0, 0, 20, 10}, {20, 0, 20, 10}});
   const auto mosaic = open_mosaic(paths);
@@ -333,8 +324,7 @@ TEST(MosaicSource, AChangedOrBrokenMemberIsAnErrorThatNamesIt) {
   EXPECT_THROW(static_cast<void>(read_whole(*mosaic)), Error);
 }
 
-TEST(MosaicSource, EveryMemberIsOpenedOnceInAPassOverSmallOnes) {
-  const TemporaryFolder folder;
+TEST_F(MosaicSource, EveryMemberIsOpenedOnceInAPassOverSmallOnes) {
   const CutRaster raster = noise_raster(placed_spec(160, 160, SampleType::kInt16, Registration::kArea));
   const auto mosaic = open_mosaic(write_pieces(raster, folder / "", regular_cut(160, 160, 16)));
   ASSERT_EQ(mosaic->plan().layers.front().members.size(), 100U);

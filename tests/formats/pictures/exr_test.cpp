@@ -16,6 +16,7 @@
 #include "formats/registry.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "support/in_folder.h"
 #include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
@@ -137,9 +138,12 @@ void expect_reads_as(const std::string& path, const ExrPicture& picture) {
   }
 }
 
-TEST(ExrSource, ReadsEverySampleTypeCompressionAndLayout) {
-  const TemporaryFolder folder;
+class ExrSource : public InFolder {
+ protected:
   const std::string path = folder / "picture.exr";
+};
+
+TEST_F(ExrSource, ReadsEverySampleTypeCompressionAndLayout) {
   for (const Imf::PixelType type : {Imf::HALF, Imf::FLOAT, Imf::UINT}) {
     for (const Imf::Compression compression : {Imf::NO_COMPRESSION, Imf::RLE_COMPRESSION, Imf::ZIPS_COMPRESSION,
                                                Imf::ZIP_COMPRESSION, Imf::PIZ_COMPRESSION, Imf::PXR24_COMPRESSION}) {
@@ -165,15 +169,13 @@ TEST(ExrSource, ReadsEverySampleTypeCompressionAndLayout) {
   }
 }
 
-TEST(ExrSource, ReadsLossyHalvesAsTheLibraryDecodesThem) {
-  const TemporaryFolder folder;
+TEST_F(ExrSource, ReadsLossyHalvesAsTheLibraryDecodesThem) {
   for (const Imf::Compression compression :
        {Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION, Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION}) {
     ExrPicture picture;
     picture.type = Imf::HALF;
     picture.compression = compression;
     picture.height = 300;  // more than the 256 lines that DWAB packs together
-    const std::string path = folder / "lossy.exr";
     write_exr(path, picture);
     const auto source = open_exr(path, {});
     const auto samples = read_whole(*source);
@@ -186,23 +188,19 @@ TEST(ExrSource, ReadsLossyHalvesAsTheLibraryDecodesThem) {
   }
 }
 
-TEST(ExrSource, TakesTheDataWindowWhereverItLies) {
-  const TemporaryFolder folder;
+TEST_F(ExrSource, TakesTheDataWindowWhereverItLies) {
   for (const Imath::V2i& origin : {Imath::V2i(30, 40), Imath::V2i(-500, -7), Imath::V2i(-3, 1000000)}) {
     for (const int tile_size : {0, 8}) {
       ExrPicture picture;
       picture.origin = origin;
       picture.tile_size = tile_size;
-      const std::string path = folder / "offset.exr";
       write_exr(path, picture);
       expect_reads_as(path, picture);
     }
   }
 }
 
-TEST(ExrSource, WarnsWhenTheDisplayWindowDiffers) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "windows.exr";
+TEST_F(ExrSource, WarnsWhenTheDisplayWindowDiffers) {
   ExrPicture picture;
   Samples samples(picture);
   Imf::Header header = header_of(picture);
@@ -217,8 +215,7 @@ TEST(ExrSource, WarnsWhenTheDisplayWindowDiffers) {
   EXPECT_THAT(source->info().warnings[0], HasSubstr("(0, 0) - (36, 40) is read; the display window (0, 0) - (99, 99)"));
 }
 
-TEST(ExrSource, PrefersElevationChannelsAndSaysSo) {
-  const TemporaryFolder folder;
+TEST_F(ExrSource, PrefersElevationChannelsAndSaysSo) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {{"A", "B", "G", "R"}, "R"},
       {{"R", "Y"}, "Y"},
@@ -239,7 +236,6 @@ TEST(ExrSource, PrefersElevationChannelsAndSaysSo) {
   for (const auto& [channels, chosen] : cases) {
     ExrPicture picture;
     picture.channels = channels;
-    const std::string path = folder / "channels.exr";
     write_exr(path, picture);
     const auto source = open_exr(path, {});
     EXPECT_EQ(source->info().channel, chosen);
@@ -251,9 +247,7 @@ TEST(ExrSource, PrefersElevationChannelsAndSaysSo) {
   }
 }
 
-TEST(ExrSource, ReadsTheChannelAskedForByNameOrNumber) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "channels.exr";
+TEST_F(ExrSource, ReadsTheChannelAskedForByNameOrNumber) {
   ExrPicture picture;
   picture.channels = {"B", "G", "R"};
   write_exr(path, picture);
@@ -270,9 +264,7 @@ TEST(ExrSource, ReadsTheChannelAskedForByNameOrNumber) {
   }
 }
 
-TEST(ExrSource, ListsTheChannelsWhenTheOneAskedForIsMissing) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "channels.exr";
+TEST_F(ExrSource, ListsTheChannelsWhenTheOneAskedForIsMissing) {
   ExrPicture picture;
   picture.channels = {"B", "G", "R"};
   write_exr(path, picture);
@@ -285,9 +277,7 @@ TEST(ExrSource, ListsTheChannelsWhenTheOneAskedForIsMissing) {
   }
 }
 
-TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "parts.exr";
+TEST_F(ExrSource, ReadsPartsOfAMultiPartFile) {
   std::vector<ExrPicture> pictures(3);
   pictures[0].channels = {"mask"};
   pictures[1].channels = {"Y", "error"};
@@ -361,9 +351,7 @@ TEST(ExrSource, ReadsPartsOfAMultiPartFile) {
               HasSubstr("`part` is for archives, TIFF and OpenEXR"));
 }
 
-TEST(ExrSource, RefusesSubsampledChannelsOnly) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "chroma.exr";
+TEST_F(ExrSource, RefusesSubsampledChannelsOnly) {
   ExrPicture picture;
   picture.width = picture.height = 8;
   Samples samples(picture);
@@ -396,13 +384,11 @@ void expect_right_or_refused(const std::string& path, const std::vector<std::byt
   }
 }
 
-TEST(ExrSource, ReportsEveryTruncation) {
-  const TemporaryFolder folder;
+TEST_F(ExrSource, ReportsEveryTruncation) {
   for (const int tile_size : {0, 16}) {
     ExrPicture picture;
     picture.tile_size = tile_size;
     picture.levels = tile_size > 0 ? Imf::MIPMAP_LEVELS : Imf::ONE_LEVEL;
-    const std::string path = folder / "whole.exr";
     write_exr(path, picture);
     const Samples samples(picture);
     const auto bytes = read_file(path);
@@ -415,9 +401,7 @@ TEST(ExrSource, ReportsEveryTruncation) {
   }
 }
 
-TEST(ExrSource, RefusesAbsurdSizesBeforeAllocating) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "absurd.exr";
+TEST_F(ExrSource, RefusesAbsurdSizesBeforeAllocating) {
   ExrPicture picture;
   write_exr(path, picture);
   const auto bytes = read_file(path);

@@ -12,6 +12,7 @@
 #include "formats/registry.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "support/in_folder.h"
 #include "support/rasters/samples.h"
 #include "support/real_files.h"
 #include "support/temporary_folder.h"
@@ -101,9 +102,12 @@ std::vector<std::byte> expected_whole(const Picture& picture, std::uint32_t chan
   return expected_window(picture, channel, {0, 0, picture.width, picture.height});
 }
 
-TEST(PngSource, ReadsEveryDepthAndChannelAsStored) {
-  const TemporaryFolder folder;
+class PngSource : public InFolder {
+ protected:
   const std::string path = folder / "picture.png";
+};
+
+TEST_F(PngSource, ReadsEveryDepthAndChannelAsStored) {
   const std::vector<std::pair<int, std::vector<int>>> kinds = {{PNG_COLOR_TYPE_GRAY, {1, 2, 4, 8, 16}},
                                                                {PNG_COLOR_TYPE_GRAY_ALPHA, {8, 16}},
                                                                {PNG_COLOR_TYPE_RGB, {8, 16}},
@@ -134,9 +138,7 @@ TEST(PngSource, ReadsEveryDepthAndChannelAsStored) {
   }
 }
 
-TEST(PngSource, DeliversWindowsInAnyOrder) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "tall.png";
+TEST_F(PngSource, DeliversWindowsInAnyOrder) {
   Picture picture;
   picture.height = 3000;  // more rows than are kept
   write_picture(path, picture);
@@ -148,9 +150,7 @@ TEST(PngSource, DeliversWindowsInAnyOrder) {
   EXPECT_EQ(read_whole(*source), expected_whole(picture));
 }
 
-TEST(PngSource, WantsToKnowWhatTheColoursOfAPictureAre) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "picture.png";
+TEST_F(PngSource, WantsToKnowWhatTheColoursOfAPictureAre) {
   Picture picture;
   picture.bit_depth = 8;
   picture.color_type = PNG_COLOR_TYPE_RGB;
@@ -187,38 +187,36 @@ TEST(PngSource, WantsToKnowWhatTheColoursOfAPictureAre) {
   EXPECT_TRUE(open_png(path, {})->info().warnings.empty());
 }
 
-TEST(PngSource, KnowsHowElevationsArePackedWithoutBeingTold) {
+TEST_F(PngSource, KnowsHowElevationsArePackedWithoutBeingTold) {
   if (real_files().empty()) GTEST_SKIP() << kNoRealFiles;
   for (const auto& [name, encoding] : {std::pair{"terrarium.png", "terrarium"},
                                        {"derived/n44e006_mapbox.png", "mapbox"},
                                        {"gale_rgba_float_16_57775_31917.png", "rgba-float"}}) {
     SCOPED_TRACE(name);
-    const std::string path = real_data() / name;
+    const std::string file = real_data() / name;
     OpenOptions options;
     options.channel = encoding;
-    const auto source = open_raster(path, options);
+    const auto source = open_raster(file, options);
     const SourceInfo& info = source->info();
     EXPECT_EQ(info.channel, encoding);
     EXPECT_EQ(info.vertical_unit, "metre");
     EXPECT_TRUE(info.warnings.empty());
     const auto all = read_whole(*source);
     // The bytes leave no doubt: the same without being told, and a warning says so.
-    const auto untold = open_raster(path, {});
+    const auto untold = open_raster(file, {});
     EXPECT_EQ(untold->info().channel, encoding);
     ASSERT_EQ(untold->info().warnings.size(), 1U);
     EXPECT_THAT(untold->info().warnings[0], HasSubstr(fmt::format("decoded as with `encoding` {}", encoding)));
     EXPECT_EQ(read_whole(*untold), all);
     OpenOptions by_name;
     by_name.channel = "R";
-    const auto red = open_raster(path, by_name);
+    const auto red = open_raster(file, by_name);
     EXPECT_EQ(red->info().sample_type, SampleType::kUint8);
     EXPECT_TRUE(red->info().warnings.empty());
   }
 }
 
-TEST(PngSource, TakesTransparentPixelsOfPackedElevationsAsVoid) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "packed.png";
+TEST_F(PngSource, TakesTransparentPixelsOfPackedElevationsAsVoid) {
   Picture picture;
   picture.bit_depth = 8;
   picture.color_type = PNG_COLOR_TYPE_RGB_ALPHA;
@@ -241,9 +239,7 @@ TEST(PngSource, TakesTransparentPixelsOfPackedElevationsAsVoid) {
   EXPECT_GT(voids, 0);
 }
 
-TEST(PngSource, UnpacksElevationsOutOfAPalette) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "flat.png";
+TEST_F(PngSource, UnpacksElevationsOutOfAPalette) {
   Picture picture;
   picture.bit_depth = 2;
   picture.color_type = PNG_COLOR_TYPE_PALETTE;
@@ -259,8 +255,7 @@ TEST(PngSource, UnpacksElevationsOutOfAPalette) {
   }
 }
 
-TEST(PngSource, PlacesTilesOfWebMapsByTheirNumbers) {
-  const TemporaryFolder folder;
+TEST_F(PngSource, PlacesTilesOfWebMapsByTheirNumbers) {
   std::filesystem::create_directories(folder / "3/5");
   Picture picture;
   picture.width = picture.height = 32;
@@ -294,9 +289,7 @@ TEST(PngSource, PlacesTilesOfWebMapsByTheirNumbers) {
   EXPECT_FALSE(place_of("3/5/4.png", packed).has_origin);
 }
 
-TEST(PngSource, UnpacksNothingButColoursOfEightBits) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "picture.png";
+TEST_F(PngSource, UnpacksNothingButColoursOfEightBits) {
   for (const auto& [color_type, depth, encoding] : {std::tuple{PNG_COLOR_TYPE_GRAY, 8, "terrarium"},
                                                     {PNG_COLOR_TYPE_RGB, 16, "mapbox"},
                                                     {PNG_COLOR_TYPE_RGB, 8, "rgba-float"}}) {
@@ -312,8 +305,7 @@ TEST(PngSource, UnpacksNothingButColoursOfEightBits) {
   }
 }
 
-TEST(PngSource, TakesGreyPixelsWithoutOpacityAsVoid) {
-  const TemporaryFolder folder;
+TEST_F(PngSource, TakesGreyPixelsWithoutOpacityAsVoid) {
   Picture picture;
   picture.color_type = PNG_COLOR_TYPE_GRAY_ALPHA;
   picture.bit_depth = 8;
@@ -334,9 +326,7 @@ TEST(PngSource, TakesGreyPixelsWithoutOpacityAsVoid) {
   EXPECT_GT(voids, 0);
 }
 
-TEST(PngSource, TakesTransparentGrayAsVoid) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "holes.png";
+TEST_F(PngSource, TakesTransparentGrayAsVoid) {
   Picture picture;
   picture.transparent_gray = 777;
   write_picture(path, picture);
@@ -348,9 +338,7 @@ TEST(PngSource, TakesTransparentGrayAsVoid) {
   EXPECT_EQ(error_of([&] { (void)open_png(path, {}); }).code(), ErrorCode::kCorrupt);
 }
 
-TEST(PngSource, RefusesPalettesAndUnknownChannels) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "picture.png";
+TEST_F(PngSource, RefusesPalettesAndUnknownChannels) {
   Picture picture;
   picture.bit_depth = 2;
   picture.color_type = PNG_COLOR_TYPE_PALETTE;
@@ -369,13 +357,11 @@ TEST(PngSource, RefusesPalettesAndUnknownChannels) {
   EXPECT_THAT(error.what(), HasSubstr(path + ": has no channel \"Z\"; it has R, G, B (or 0...2)"));
 }
 
-TEST(PngSource, ReportsEveryTruncation) {
-  const TemporaryFolder folder;
+TEST_F(PngSource, ReportsEveryTruncation) {
   const std::string cut = folder / "cut.png";
   for (const bool interlaced : {false, true}) {
     Picture picture;
     picture.interlaced = interlaced;
-    const std::string path = folder / "whole.png";
     write_picture(path, picture);
     const auto bytes = read_file(path);
     for (std::size_t length = 0; length < bytes.size(); ++length) {
@@ -388,9 +374,7 @@ TEST(PngSource, ReportsEveryTruncation) {
   }
 }
 
-TEST(PngSource, NamesTheRowThatIsMissingAndReadsTheOnesBefore) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "cut.png";
+TEST_F(PngSource, NamesTheRowThatIsMissingAndReadsTheOnesBefore) {
   Picture picture;
   picture.width = 1000;  // tens of kilobytes: libpng reads 8 KiB ahead
   picture.height = 400;
@@ -404,9 +388,7 @@ TEST(PngSource, NamesTheRowThatIsMissingAndReadsTheOnesBefore) {
   EXPECT_THAT(error_of([&] { (void)read_whole(*source); }).what(), HasSubstr("PNG row "));
 }
 
-TEST(PngSource, NeverDeliversASampleThatAFlippedBitChanged) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "flipped.png";
+TEST_F(PngSource, NeverDeliversASampleThatAFlippedBitChanged) {
   for (const bool interlaced : {false, true}) {
     Picture picture;
     picture.width = picture.height = 16;
@@ -446,9 +428,7 @@ void write_header_only(const std::string& path, std::uint32_t width, std::uint32
   write_file(path, bytes);
 }
 
-TEST(PngSource, RefusesAbsurdSizesBeforeAllocating) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "absurd.png";
+TEST_F(PngSource, RefusesAbsurdSizesBeforeAllocating) {
   for (const auto& [width, height] : {std::pair{0x7FFFFFFFU, 1U}, {0x7FFFFFFFU, 0x7FFFFFFFU}, {100000U, 100000U}}) {
     write_header_only(path, width, height, 0);
     const Error error = error_of([&] { (void)open_png(path, {}); });
