@@ -15,12 +15,8 @@ constexpr double kTolerance = 0.02;  // what the closed forms, limits for long w
 
 /// One triangle count and one frequency, given in cycles per sample of that mesh.
 ExperimentResult measure(bool interpolate, double cycles_per_sample) {
-  ExperimentSettings settings;
-  settings.triangles = {2000};
-  settings.phases = 4;
-  settings.orientations = 40;
-  settings.frequency_count = 1;
-  settings.interpolate = interpolate;
+  ExperimentSettings settings{
+      .triangles = {2000}, .phases = 4, .orientations = 40, .frequency_count = 1, .interpolate = interpolate};
   // The first frequency is 0.01, 0.005·√(nyquist/2000) cycles per sample.
   settings.nyquist_triangles = std::lround(2000.0 * std::pow(cycles_per_sample / 0.005, 2));
   return run_experiment(settings);

@@ -16,11 +16,7 @@ namespace {
 using testing::HasSubstr;
 
 ExperimentSettings small_settings() {
-  ExperimentSettings settings;
-  settings.triangles = {1000, 2000};
-  settings.phases = 3;
-  settings.orientations = 6;
-  settings.frequency_stride = 6;
+  ExperimentSettings settings{.triangles = {1000, 2000}, .phases = 3, .orientations = 6, .frequency_stride = 6};
   return settings;
 }
 
@@ -51,13 +47,12 @@ TEST(Experiment, StopsWhenAsked) {
 
 /// One mesh of 2000 triangles and waves that lie along one direction, heights interpolated.
 Errors along(MeshKind mesh, double cycles_per_sample) {
-  ExperimentSettings settings;
-  settings.triangles = {2000};
-  settings.phases = 4;
-  settings.orientations = 20;
-  settings.frequency_count = 1;
-  settings.interpolate = true;
-  settings.nyquist_triangles = std::lround(2000.0 * std::pow(cycles_per_sample / 0.005, 2));
+  ExperimentSettings settings{.triangles = {2000},
+                              .phases = 4,
+                              .orientations = 20,
+                              .frequency_count = 1,
+                              .nyquist_triangles = std::lround(2000.0 * std::pow(cycles_per_sample / 0.005, 2)),
+                              .interpolate = true};
   return run_experiment(settings).trials[1].errors[mesh];
 }
 

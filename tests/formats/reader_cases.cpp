@@ -214,8 +214,7 @@ std::vector<ReaderCase> reader_cases() {
   const std::string esri = "ncols 4\nnrows 3\nxllcorner 100\nyllcorner 200.5\ncellsize 10\nNODATA_value -9999\n";
   const std::string numbers = "1 2.5 3 4\n5 -9999 7e1 8\n9 10 nan 12\n";
   const std::string data = std::string(ISOHF_SOURCE_DIR) + "/tests/formats/data/";
-  OpenOptions packed;
-  packed.channel = "terrarium";
+  const OpenOptions packed = of_channel("terrarium");
   OpenOptions streamed;
   streamed.unpacked_bytes = 0;
   std::vector<ReaderCase> cases = {

@@ -11,6 +11,7 @@
 #include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
@@ -173,15 +174,14 @@ TEST_F(TiffLayouts, EverySampleTypeComesThroughEveryCompression) {
           // libtiff writes such files with the bytes the wrong way round, and reads right ones; see TiffSource.
           if (predictor == 3 && big_endian) continue;
           for (const auto& [samples, separate] : {std::pair(1, false), std::pair(3, false), std::pair(3, true)}) {
-            Storage s;
-            s.type = type;
-            s.compression = compression;
-            s.predictor = predictor;
-            s.tile = tile;
-            s.big_endian = big_endian;
-            s.samples = samples;
-            s.separate = separate;
-            s.big_tiff = (written++ % 2) != 0;
+            Storage s{.type = type,
+                      .samples = samples,
+                      .separate = separate,
+                      .tile = tile,
+                      .compression = compression,
+                      .predictor = predictor,
+                      .big_endian = big_endian,
+                      .big_tiff = (written++ % 2) != 0};
             expect_through(s);
             if (HasFatalFailure()) return;
           }
@@ -197,11 +197,10 @@ TEST_F(TiffLayouts, EveryStripHeightAndEdgeComesThrough) {
     for (std::uint32_t rows = 1; rows <= 6; ++rows) {
       for (std::int64_t height = 1; height <= 7; ++height) {
         for (const std::int64_t width : {1, 2, 17}) {
-          Storage s;
-          s.width = width;
-          s.height = height;
-          s.rows_per_strip = rows == 6 ? UINT32_MAX : rows;
-          s.compression = compression;
+          Storage s{.width = width,
+                    .height = height,
+                    .rows_per_strip = rows == 6 ? UINT32_MAX : rows,
+                    .compression = compression};
           expect_through(s);
           if (HasFatalFailure()) return;
         }
@@ -214,12 +213,8 @@ TEST_F(TiffLayouts, EveryTileEdgeComesThrough) {
   for (const int compression : {COMPRESSION_NONE, COMPRESSION_LZW}) {
     for (const std::int64_t width : {1, 15, 16, 17, 32, 33}) {
       for (const std::int64_t height : {1, 15, 16, 17, 32, 33}) {
-        Storage s;
-        s.width = width;
-        s.height = height;
-        s.tile = 16;
-        s.compression = compression;
-        s.type = SampleType::kFloat32;
+        Storage s{
+            .type = SampleType::kFloat32, .width = width, .height = height, .tile = 16, .compression = compression};
         expect_through(s);
         if (HasFatalFailure()) return;
       }
@@ -232,16 +227,10 @@ TEST_F(TiffLayouts, WindowsInAnyOrderEqualTheWhole) {
   for (const int tile : {0, 16}) {
     for (const int compression : {COMPRESSION_NONE, COMPRESSION_ADOBE_DEFLATE}) {
       for (const auto& [samples, separate] : {std::pair(1, false), std::pair(2, false), std::pair(2, true)}) {
-        Storage s;
-        s.tile = tile;
-        s.compression = compression;
-        s.samples = samples;
-        s.separate = separate;
-        s.big_endian = true;
+        Storage s{
+            .samples = samples, .separate = separate, .tile = tile, .compression = compression, .big_endian = true};
         ASSERT_TRUE(write_tiff(path(), s));
-        OpenOptions options;
-        options.channel = std::to_string(samples - 1);
-        const auto source = open_tiff(path(), options);
+        const auto source = open_tiff(path(), test::of_channel(std::to_string(samples - 1)));
         for (int i = 0; i < 300; ++i) {
           const auto pick = [&](std::int64_t n) {
             return static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(n));
@@ -259,16 +248,13 @@ TEST_F(TiffLayouts, WindowsInAnyOrderEqualTheWhole) {
 /// Compressed strips of more than 16 MiB are decoded row by row.
 TEST_F(TiffLayouts, LargeCompressedStripsComeThroughInAnyOrder) {
   for (const auto& [rows_per_strip, samples] : {std::pair(3000U, 1), std::pair(2100U, 1), std::pair(3000U, 2)}) {
-    Storage s;
-    s.width = 4096 / samples;
-    s.height = 2200;
-    s.rows_per_strip = rows_per_strip;
-    s.samples = samples;
-    s.compression = COMPRESSION_LZW;
+    Storage s{.width = 4096 / samples,
+              .height = 2200,
+              .samples = samples,
+              .rows_per_strip = rows_per_strip,
+              .compression = COMPRESSION_LZW};
     ASSERT_TRUE(write_tiff(path(), s));
-    OpenOptions options;
-    options.channel = std::to_string(samples - 1);
-    const auto source = open_tiff(path(), options);
+    const auto source = open_tiff(path(), test::of_channel(std::to_string(samples - 1)));
     EXPECT_LT(source->info().block_height, 300);
     for (std::int64_t row = 0; row < s.height; row += 450) {
       // Neighbouring bands overlap, as a resampler's do.
@@ -283,27 +269,16 @@ TEST_F(TiffLayouts, LargeCompressedStripsComeThroughInAnyOrder) {
 }
 
 TEST_F(TiffLayouts, LargePlainStripsComeThrough) {
-  Storage s;
-  s.width = 4096;
-  s.height = 2500;
-  s.rows_per_strip = 2500;
-  s.samples = 2;
+  Storage s{.width = 4096, .height = 2500, .samples = 2, .rows_per_strip = 2500};
   ASSERT_TRUE(write_tiff(path(), s));
-  OpenOptions options;
-  options.channel = "1";
-  const auto source = open_tiff(path(), options);
+  const auto source = open_tiff(path(), test::of_channel("1"));
   EXPECT_EQ(source->info().block_height, 1);
   expect_window(*source, s, 1, {0, 100, s.width, 1000});
   expect_window(*source, s, 1, {17, 2400, 3000, 100});
 }
 
 TEST_F(TiffLayouts, ManyTilesComeThroughTheCache) {
-  Storage s;
-  s.width = 3000;
-  s.height = 1100;
-  s.tile = 256;
-  s.type = SampleType::kFloat64;
-  s.compression = COMPRESSION_LZW;
+  Storage s{.type = SampleType::kFloat64, .width = 3000, .height = 1100, .tile = 256, .compression = COMPRESSION_LZW};
   ASSERT_TRUE(write_tiff(path(), s));
   const auto source = open_tiff(path(), {});
   for (std::int64_t row = 0; row < s.height; row += 100) {

@@ -206,8 +206,7 @@ TEST_F(TiffSource, PicksTheChannel) {
   tiff.image(2, 1, 16, 1, 1).shorts(262, {2}).shorts(277, {4}).shorts(258, {16, 16, 16, 16}).shorts(338, {2});
   tiff.shorts(339, {1, 1, 1, 1}).block(bytes_of<std::uint16_t>({10, 20, 30, 40, 11, 21, 31, 41}));
   const auto with = [&](const std::string& channel) {
-    OpenOptions options;
-    options.channel = channel;
+    const OpenOptions options = test::of_channel(channel);
     EXPECT_EQ(info_of(tiff, options).warnings.size(), channel.empty() ? 1U : 0U);
     return values(tiff, options);
   };
@@ -217,8 +216,7 @@ TEST_F(TiffSource, PicksTheChannel) {
   EXPECT_EQ(with("B"), (Values{30, 31}));
   EXPECT_EQ(with("A"), (Values{40, 41}));
   EXPECT_EQ(with("3"), (Values{40, 41}));
-  OpenOptions options;
-  options.channel = "2";
+  OpenOptions options = test::of_channel("2");
   EXPECT_EQ(info_of(tiff, options).channel, "B");
   for (const char* wrong : {"4", "Y", "-1", "R ", "00x"}) {
     options.channel = wrong;
@@ -242,9 +240,7 @@ TEST_F(TiffSource, PicksTheChannelThatIsDescribedAsElevations) {
   EXPECT_EQ(values(described("slope", "z")), (Values{20, 21}));
   EXPECT_EQ(values(described("Height", "elevation")), (Values{10, 11}));
   EXPECT_EQ(values(described("slope", "elevation error")), (Values{10, 11}));
-  OpenOptions options;
-  options.channel = "0";
-  EXPECT_EQ(values(described("slope", "elevation"), options), (Values{10, 11}));
+  EXPECT_EQ(values(described("slope", "elevation"), test::of_channel("0")), (Values{10, 11}));
 }
 
 TEST_F(TiffSource, RefusesAColourPictureUnlessAChannelIsNamed) {
@@ -252,9 +248,7 @@ TEST_F(TiffSource, RefusesAColourPictureUnlessAChannelIsNamed) {
   tiff.image(1, 1, 8, 1, 1).shorts(262, {2}).shorts(277, {3}).shorts(258, {8, 8, 8}).shorts(339, {1, 1, 1});
   tiff.block("abc");
   EXPECT_EQ(code_of(tiff), ErrorCode::kUnsupported);
-  OpenOptions options;
-  options.channel = "G";
-  EXPECT_EQ(values(tiff, options), (Values{'b'}));
+  EXPECT_EQ(values(tiff, test::of_channel("G")), (Values{'b'}));
 }
 
 TEST_F(TiffSource, ReadsMinIsWhiteAsHeights) {

@@ -225,9 +225,7 @@ TEST_F(AsciiGrid, NamesTheLineThatIsWrong) {
   EXPECT_THAT(what(header + "1e400 2 3 4 5 6\n"), HasSubstr("\"1e400\" is not a number"));
   EXPECT_THAT(what(header + std::string(5000, '1') + " 2 3 4 5 6\n"), HasSubstr("is no"));
   EXPECT_THAT(what(header + std::string(600000, '1')), HasSubstr("bytes without a blank"));
-  OpenOptions options;
-  options.channel = "R";
-  EXPECT_EQ(error_of([&] { (void)open(header + kNumbers, options); }).code(), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(error_of([&] { (void)open(header + kNumbers, of_channel("R")); }).code(), ErrorCode::kInvalidArgument);
 }
 
 TEST_F(AsciiGrid, DeliversEveryWindowInAnyOrder) {

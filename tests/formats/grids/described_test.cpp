@@ -38,9 +38,7 @@ class Described : public ::testing::Test {
  protected:
   void write(const std::string& name, const std::string& bytes) const { write_file(folder_ / name, bytes); }
   [[nodiscard]] std::unique_ptr<HeightSource> open(const std::string& name, const std::string& channel = {}) const {
-    OpenOptions options;
-    options.channel = channel;
-    return open_raster(folder_ / name, options);
+    return open_raster(folder_ / name, of_channel(channel));
   }
   [[nodiscard]] std::string failure(const std::string& name, ErrorCode* code = nullptr) const {
     return failure_of(folder_.path(), code, [&] { read_corner(*open(name)); });

@@ -158,9 +158,7 @@ TEST_F(Dted, SaysWhichLabelIsWrong) {
   EXPECT_THAT(says(47, "0003"), HasSubstr("DSI: says 4 x 5 posts, UHL 3 x 5"));
   EXPECT_THAT(says(80 + 264, "0010000.0"), HasSubstr("rotated"));
   EXPECT_THAT(says(728, "XXX"), HasSubstr("ACC: is not at byte 728"));
-  OpenOptions options;
-  options.channel = "1";
-  EXPECT_THROW((void)open_dted(write(cell()), options), Error);
+  EXPECT_THROW((void)open_dted(write(cell()), test::of_channel("1")), Error);
 }
 
 }  // namespace

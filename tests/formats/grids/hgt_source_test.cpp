@@ -188,9 +188,7 @@ TEST_F(HgtSource, RefusesWhatIsNoTile) {
   EXPECT_EQ(code_of(folder_ / "N02E002.hgt"), ErrorCode::kIo);
   EXPECT_EQ(code_of(folder_.path()), ErrorCode::kIo);
   EXPECT_EQ(code_of(write("N01E001.hgt.zip", zipped("readme.txt", tile(3, 3), true))), ErrorCode::kUnsupported);
-  OpenOptions options;
-  options.channel = "R";
-  EXPECT_EQ(code_of(write("N01E001.hgt", tile(3, 3)), options), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code_of(write("N01E001.hgt", tile(3, 3)), test::of_channel("R")), ErrorCode::kInvalidArgument);
 }
 
 }  // namespace

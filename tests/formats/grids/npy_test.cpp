@@ -162,8 +162,7 @@ TEST_F(Npy, PicksAnArrayOfAnArchive) {
     EXPECT_EQ(first->info().width, 3);
     EXPECT_EQ(first->info().channel, "low");
     EXPECT_THAT(first->info().warnings, ::testing::ElementsAre(HasSubstr("array low is read, of dx, low, high")));
-    OpenOptions options;
-    options.channel = "high";
+    OpenOptions options = test::of_channel("high");
     const auto high = open_raster(path, options);
     EXPECT_EQ(high->info().width, 2);
     EXPECT_TRUE(high->info().warnings.empty());

@@ -152,12 +152,8 @@ TEST_F(ExrSource, ReadsEverySampleTypeCompressionAndLayout) {
           if (tile_size == 0 && levels != Imf::ONE_LEVEL) continue;
           for (const Imf::LineOrder order : {Imf::INCREASING_Y, Imf::DECREASING_Y, Imf::RANDOM_Y}) {
             if (tile_size == 0 && order == Imf::RANDOM_Y) continue;
-            ExrPicture picture;
-            picture.type = type;
-            picture.compression = compression;
-            picture.tile_size = tile_size;
-            picture.levels = levels;
-            picture.order = order;
+            ExrPicture picture{
+                .type = type, .compression = compression, .order = order, .tile_size = tile_size, .levels = levels};
             SCOPED_TRACE(fmt::format("type {} compression {} tiles {} levels {} order {}", type, compression, tile_size,
                                      levels, order));
             write_exr(path, picture);
@@ -191,9 +187,7 @@ TEST_F(ExrSource, ReadsLossyHalvesAsTheLibraryDecodesThem) {
 TEST_F(ExrSource, TakesTheDataWindowWhereverItLies) {
   for (const Imath::V2i& origin : {Imath::V2i(30, 40), Imath::V2i(-500, -7), Imath::V2i(-3, 1000000)}) {
     for (const int tile_size : {0, 8}) {
-      ExrPicture picture;
-      picture.origin = origin;
-      picture.tile_size = tile_size;
+      ExrPicture picture{.origin = origin, .tile_size = tile_size};
       write_exr(path, picture);
       expect_reads_as(path, picture);
     }
@@ -255,9 +249,7 @@ TEST_F(ExrSource, ReadsTheChannelAskedForByNameOrNumber) {
   for (std::size_t channel = 0; channel < 3; ++channel) {
     // Numbers count as oiiotool lists the channels: R, G, B.
     for (const std::string& name : {picture.channels[channel], std::to_string(2 - channel)}) {
-      OpenOptions options;
-      options.channel = name;
-      const auto source = open_exr(path, options);
+      const auto source = open_exr(path, of_channel(name));
       EXPECT_EQ(read_whole(*source), samples.plane(channel));
       EXPECT_TRUE(source->info().warnings.empty());
     }
@@ -269,9 +261,7 @@ TEST_F(ExrSource, ListsTheChannelsWhenTheOneAskedForIsMissing) {
   picture.channels = {"B", "G", "R"};
   write_exr(path, picture);
   for (const char* name : {"Y", "3", "-1", "1x", "r", "R "}) {
-    OpenOptions options;
-    options.channel = name;
-    const Error error = error_of([&] { (void)open_exr(path, options); });
+    const Error error = error_of([&] { (void)open_exr(path, of_channel(name)); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
     EXPECT_EQ(error.what(), fmt::format("{}: has no channel \"{}\"; it has R, G, B (or 0...2)", path, name));
   }
@@ -312,9 +302,7 @@ TEST_F(ExrSource, ReadsPartsOfAMultiPartFile) {
     }
   }
   const auto expect = [&](const std::string& channel, std::size_t part, std::size_t plane, const std::string& name) {
-    OpenOptions options;
-    options.channel = channel;
-    const auto source = open_exr(path, options);
+    const auto source = open_exr(path, of_channel(channel));
     EXPECT_EQ(read_whole(*source), Samples(pictures[part]).plane(plane)) << channel;
     EXPECT_EQ(source->info().channel, name);
   };
@@ -324,9 +312,7 @@ TEST_F(ExrSource, ReadsPartsOfAMultiPartFile) {
   expect("error", 1, 1, "ground.error");
   expect("small.Y", 2, 0, "small.Y");
   expect("3", 2, 0, "small.Y");
-  OpenOptions options;
-  options.channel = "Z";
-  EXPECT_THAT(error_of([&] { (void)open_exr(path, options); }).what(),
+  EXPECT_THAT(error_of([&] { (void)open_exr(path, of_channel("Z")); }).what(),
               HasSubstr("it has cover.mask, ground.Y, ground.error, small.Y"));
   const auto expect_part = [&](const char* part, const char* channel, std::size_t number, std::size_t plane,
                                const std::string& name) {
@@ -366,9 +352,7 @@ TEST_F(ExrSource, RefusesSubsampledChannelsOnly) {
     file.writePixels(8);
   }
   EXPECT_EQ(read_whole(*open_exr(path, {})), samples.plane(0));
-  OpenOptions options;
-  options.channel = "BY";
-  const Error error = error_of([&] { (void)open_exr(path, options); });
+  const Error error = error_of([&] { (void)open_exr(path, of_channel("BY")); });
   EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
   EXPECT_THAT(error.what(), HasSubstr("BY is subsampled"));
 }
@@ -386,9 +370,7 @@ void expect_right_or_refused(const std::string& path, const std::vector<std::byt
 
 TEST_F(ExrSource, ReportsEveryTruncation) {
   for (const int tile_size : {0, 16}) {
-    ExrPicture picture;
-    picture.tile_size = tile_size;
-    picture.levels = tile_size > 0 ? Imf::MIPMAP_LEVELS : Imf::ONE_LEVEL;
+    ExrPicture picture{.tile_size = tile_size, .levels = tile_size > 0 ? Imf::MIPMAP_LEVELS : Imf::ONE_LEVEL};
     write_exr(path, picture);
     const Samples samples(picture);
     const auto bytes = read_file(path);

@@ -88,16 +88,12 @@ TEST_F(OiioModule, ReadsTheChannelAskedFor) {
   EXPECT_THAT(error_of([&] { (void)open_raster(path, {}); }).what(),
               HasSubstr("is a colour picture with channels R, G, B; say which one holds elevations"));
   for (const char* name : {"G", "1"}) {
-    OpenOptions options;
-    options.channel = name;
-    const auto source = open_raster(path, options);
+    const auto source = open_raster(path, of_channel(name));
     const auto samples = read_whole(*source);
     ASSERT_EQ(samples.size(), 8U);
     for (std::size_t at = 0; at < samples.size(); ++at) EXPECT_EQ(static_cast<std::size_t>(samples[at]), at * 3 + 1);
   }
-  OpenOptions options;
-  options.channel = "Z";
-  const Error error = error_of([&] { (void)open_raster(path, options); });
+  const Error error = error_of([&] { (void)open_raster(path, of_channel("Z")); });
   EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
   EXPECT_EQ(error.what(), path + ": has no channel \"Z\"; it has R, G, B (or 0...2)");
 }
@@ -111,9 +107,7 @@ TEST_F(OiioModule, UnpacksElevationsOutOfColours) {
     for (const int byte : {code >> 16, code >> 8, code}) bytes.push_back(static_cast<char>(byte & 0xFF));
   }
   write_file(path, bytes);
-  OpenOptions options;
-  options.channel = "mapbox";
-  const auto source = open_raster(path, options);
+  const auto source = open_raster(path, of_channel("mapbox"));
   EXPECT_TRUE(source->info().warnings.empty());
   EXPECT_EQ(source->info().georeference.system.epsg, 3857);
   const auto samples = read_window(*source, {3, 2, 4, 5});

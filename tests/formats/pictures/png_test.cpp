@@ -116,17 +116,12 @@ TEST_F(PngSource, ReadsEveryDepthAndChannelAsStored) {
   for (const auto& [color_type, depths] : kinds) {
     for (const int depth : depths) {
       for (const bool interlaced : {false, true}) {
-        Picture picture;
-        picture.color_type = color_type;
-        picture.bit_depth = depth;
-        picture.interlaced = interlaced;
+        Picture picture{.bit_depth = depth, .color_type = color_type, .interlaced = interlaced};
         SCOPED_TRACE(fmt::format("colour type {} depth {} interlaced {}", color_type, depth, interlaced));
         write_picture(path, picture);
         for (std::uint32_t channel = 0; channel < picture.channels(); ++channel) {
           for (const std::string& name : {names[picture.channels()][channel], std::to_string(channel)}) {
-            OpenOptions options;
-            options.channel = name;
-            const auto source = open_png(path, options);
+            const auto source = open_png(path, of_channel(name));
             EXPECT_EQ(read_whole(*source), expected_whole(picture, channel));
             EXPECT_EQ(source->info().sample_type, depth == 16 ? SampleType::kUint16 : SampleType::kUint8);
             EXPECT_TRUE(source->info().warnings.empty());
@@ -151,9 +146,7 @@ TEST_F(PngSource, DeliversWindowsInAnyOrder) {
 }
 
 TEST_F(PngSource, WantsToKnowWhatTheColoursOfAPictureAre) {
-  Picture picture;
-  picture.bit_depth = 8;
-  picture.color_type = PNG_COLOR_TYPE_RGB;
+  Picture picture{.bit_depth = 8, .color_type = PNG_COLOR_TYPE_RGB};
   for (const int depth : {8, 16}) {
     picture.bit_depth = depth;
     write_picture(path, picture);
@@ -162,9 +155,7 @@ TEST_F(PngSource, WantsToKnowWhatTheColoursOfAPictureAre) {
     EXPECT_THAT(error.what(), HasSubstr("is a colour picture with channels R, G, B"));
     EXPECT_THAT(error.what(), HasSubstr("`channel` R"));
     EXPECT_THAT(error.what(), HasSubstr("`encoding` terrarium"));
-    OpenOptions options;
-    options.channel = "R";
-    EXPECT_TRUE(open_png(path, options)->info().warnings.empty());
+    EXPECT_TRUE(open_png(path, of_channel("R"))->info().warnings.empty());
   }
   picture.grey = true;
   for (const int depth : {16, 8}) {
@@ -194,9 +185,7 @@ TEST_F(PngSource, KnowsHowElevationsArePackedWithoutBeingTold) {
                                        {"gale_rgba_float_16_57775_31917.png", "rgba-float"}}) {
     SCOPED_TRACE(name);
     const std::string file = real_data() / name;
-    OpenOptions options;
-    options.channel = encoding;
-    const auto source = open_raster(file, options);
+    const auto source = open_raster(file, of_channel(encoding));
     const SourceInfo& info = source->info();
     EXPECT_EQ(info.channel, encoding);
     EXPECT_EQ(info.vertical_unit, "metre");
@@ -208,22 +197,16 @@ TEST_F(PngSource, KnowsHowElevationsArePackedWithoutBeingTold) {
     ASSERT_EQ(untold->info().warnings.size(), 1U);
     EXPECT_THAT(untold->info().warnings[0], HasSubstr(fmt::format("decoded as with `encoding` {}", encoding)));
     EXPECT_EQ(read_whole(*untold), all);
-    OpenOptions by_name;
-    by_name.channel = "R";
-    const auto red = open_raster(file, by_name);
+    const auto red = open_raster(file, of_channel("R"));
     EXPECT_EQ(red->info().sample_type, SampleType::kUint8);
     EXPECT_TRUE(red->info().warnings.empty());
   }
 }
 
 TEST_F(PngSource, TakesTransparentPixelsOfPackedElevationsAsVoid) {
-  Picture picture;
-  picture.bit_depth = 8;
-  picture.color_type = PNG_COLOR_TYPE_RGB_ALPHA;
+  Picture picture{.bit_depth = 8, .color_type = PNG_COLOR_TYPE_RGB_ALPHA};
   write_picture(path, picture);
-  OpenOptions options;
-  options.channel = "mapbox";
-  const auto source = open_raster(path, options);
+  const auto source = open_raster(path, of_channel("mapbox"));
   EXPECT_EQ(source->info().void_values, std::vector<double>{-1.0});
   const std::vector<double> values = values_of(*source);
   int voids = 0;
@@ -240,14 +223,10 @@ TEST_F(PngSource, TakesTransparentPixelsOfPackedElevationsAsVoid) {
 }
 
 TEST_F(PngSource, UnpacksElevationsOutOfAPalette) {
-  Picture picture;
-  picture.bit_depth = 2;
-  picture.color_type = PNG_COLOR_TYPE_PALETTE;
+  Picture picture{.bit_depth = 2, .color_type = PNG_COLOR_TYPE_PALETTE};
   write_picture(path, picture);
   EXPECT_THAT(error_of([&] { (void)open_raster(path, {}); }).what(), HasSubstr("unless these are packed into them"));
-  OpenOptions options;
-  options.channel = "mapbox";
-  const std::vector<double> values = values_of(*open_raster(path, options));
+  const std::vector<double> values = values_of(*open_raster(path, of_channel("mapbox")));
   for (std::uint32_t row = 0; row < picture.height; ++row) {
     for (std::uint32_t column = 0; column < picture.width; ++column) {
       ASSERT_EQ(values[row * picture.width + column], picture.value(column, row, 0) * 0x010101);
@@ -261,8 +240,7 @@ TEST_F(PngSource, PlacesTilesOfWebMapsByTheirNumbers) {
   picture.width = picture.height = 32;
   picture.bit_depth = 8;
   picture.color_type = PNG_COLOR_TYPE_RGB;
-  OpenOptions packed;
-  packed.channel = "terrarium";
+  const OpenOptions packed = of_channel("terrarium");
   const auto place_of = [&](const std::string& name, const OpenOptions& options) {
     write_picture(folder / name, picture);
     return open_raster(folder / name, options)->info().georeference;
@@ -279,9 +257,7 @@ TEST_F(PngSource, PlacesTilesOfWebMapsByTheirNumbers) {
     EXPECT_NEAR(place.origin_x, kTile + kTile / 64.0, 1e-6);
     EXPECT_NEAR(place.origin_y, 2.0 * kTile - kTile / 64.0, 1e-6);
   }
-  OpenOptions red;
-  red.channel = "R";
-  EXPECT_FALSE(place_of("3/5/3.png", red).has_origin);
+  EXPECT_FALSE(place_of("3/5/3.png", of_channel("R")).has_origin);
   for (const char* name : {"3/5/8.png", "3/5/-1.png", "3/5/2a.png", "3/2.png"}) {
     EXPECT_FALSE(place_of(name, packed).has_origin) << name;
   }
@@ -293,22 +269,16 @@ TEST_F(PngSource, UnpacksNothingButColoursOfEightBits) {
   for (const auto& [color_type, depth, encoding] : {std::tuple{PNG_COLOR_TYPE_GRAY, 8, "terrarium"},
                                                     {PNG_COLOR_TYPE_RGB, 16, "mapbox"},
                                                     {PNG_COLOR_TYPE_RGB, 8, "rgba-float"}}) {
-    Picture picture;
-    picture.color_type = color_type;
-    picture.bit_depth = depth;
+    Picture picture{.bit_depth = depth, .color_type = color_type};
     write_picture(path, picture);
-    OpenOptions options;
-    options.channel = encoding;
-    const Error error = error_of([&] { (void)open_raster(path, options); });
+    const Error error = error_of([&] { (void)open_raster(path, of_channel(encoding)); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
     EXPECT_THAT(error.what(), HasSubstr(fmt::format("encoding {} packs an elevation", encoding)));
   }
 }
 
 TEST_F(PngSource, TakesGreyPixelsWithoutOpacityAsVoid) {
-  Picture picture;
-  picture.color_type = PNG_COLOR_TYPE_GRAY_ALPHA;
-  picture.bit_depth = 8;
+  Picture picture{.bit_depth = 8, .color_type = PNG_COLOR_TYPE_GRAY_ALPHA};
   write_picture(folder / "a.png", picture);
   const auto source = open_png(folder / "a.png", {});
   ASSERT_EQ(source->info().sample_type, SampleType::kInt16);
@@ -339,9 +309,7 @@ TEST_F(PngSource, TakesTransparentGrayAsVoid) {
 }
 
 TEST_F(PngSource, RefusesPalettesAndUnknownChannels) {
-  Picture picture;
-  picture.bit_depth = 2;
-  picture.color_type = PNG_COLOR_TYPE_PALETTE;
+  Picture picture{.bit_depth = 2, .color_type = PNG_COLOR_TYPE_PALETTE};
   write_picture(path, picture);
   Error error = error_of([&] { (void)open_png(path, {}); });
   EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
@@ -350,9 +318,7 @@ TEST_F(PngSource, RefusesPalettesAndUnknownChannels) {
   picture.bit_depth = 8;
   picture.color_type = PNG_COLOR_TYPE_RGB;
   write_picture(path, picture);
-  OpenOptions options;
-  options.channel = "Z";
-  error = error_of([&] { (void)open_png(path, options); });
+  error = error_of([&] { (void)open_png(path, of_channel("Z")); });
   EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
   EXPECT_THAT(error.what(), HasSubstr(path + ": has no channel \"Z\"; it has R, G, B (or 0...2)"));
 }

@@ -97,10 +97,8 @@ TEST_F(Isis3, WindowsEqualTheWholeInEveryLayout) {
       std::string pixels = kWord;
       if (big_endian) pixels.replace(pixels.find("Lsb"), 3, "Msb");
       for (int band = 0; band < 2; ++band) {
-        OpenOptions options;
-        options.channel = std::to_string(band);
-        const auto source =
-            open_raster(write(label(layout, 2, pixels) + tiles(tile_columns, tile_rows, 2, big_endian)), options);
+        const auto source = open_raster(write(label(layout, 2, pixels) + tiles(tile_columns, tile_rows, 2, big_endian)),
+                                        test::of_channel(std::to_string(band)));
         test::expect_every_window(*source, test::stored<std::int16_t>(5, 4, [&](std::int64_t c, std::int64_t r) {
           return height_at(band, static_cast<int>(c), static_cast<int>(r));
         }));

@@ -188,9 +188,7 @@ TEST_F(Pds3, WindowsEqualTheWholeInEveryLayout) {
         data += pad;
       }
       for (int band = 0; band < 2; ++band) {
-        OpenOptions options;
-        options.channel = std::to_string(band);
-        const auto source = open_raster(write("b.img", attached(image) + data), options);
+        const auto source = open_raster(write("b.img", attached(image) + data), test::of_channel(std::to_string(band)));
         test::expect_every_window(*source, test::stored<std::int16_t>(4, 3, [&](std::int64_t c, std::int64_t r) {
           return value(band, static_cast<int>(r), static_cast<int>(c));
         }));

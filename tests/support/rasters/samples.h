@@ -4,12 +4,20 @@
 #include <cmath>
 #include <cstddef>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "isohf/base/sample.h"
 #include "isohf/raster.h"
 
 namespace isohf::test {
+
+/// Options that name a channel.
+inline OpenOptions of_channel(const std::string& name) {
+  OpenOptions options;
+  options.channel = name;
+  return options;
+}
 
 /// The samples of a window as the file stores them, in host order.
 inline std::vector<std::byte> read_window(HeightSource& source, const Window& window) {
