@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <cstring>
-
 #include "formats/geotiff/tiff_bytes.h"
+#include "formats/grids/dted_cell.h"
 #include "formats/grids/netcdf_bytes.h"
+#include "formats/io/gzipped.h"
 #include "formats/io/tar_archive.h"
 #include "formats/io/zip_archive.h"
 #include "formats/planetary/pds4_label.h"
@@ -110,28 +110,6 @@ std::string isis3() {
   return label + counting(24, 2);
 }
 
-std::string dted() {
-  constexpr int kColumns = 3;
-  constexpr int kPosts = 4;
-  std::string bytes(3428, ' ');
-  const auto put = [&](std::size_t at, const std::string& text) { bytes.replace(at, text.size(), text); };
-  put(0, "UHL10800000W0430000N030001500200U  ");
-  put(47, fmt::format("{:04}{:04}0", kColumns, kPosts));
-  put(80, "DSIU");
-  put(80 + 141, "MSLWGS84");
-  put(80 + 264, fmt::format("0000000.001500300{:04}{:04}00", kPosts, kColumns));
-  put(728, "ACC");
-  for (int c = 0; c < kColumns; ++c) {
-    std::string record = {'\xAA', '\0', '\0', static_cast<char>(c), '\0', static_cast<char>(c), '\0', '\0'};
-    for (int p = 0; p < kPosts; ++p) record += {'\1', static_cast<char>(10 * c + p)};
-    std::uint32_t sum = 0;
-    for (const char byte : record) sum += static_cast<unsigned char>(byte);
-    for (unsigned shift = 24; shift < 32; shift -= 8) record += static_cast<char>(sum >> shift & 0xFFU);
-    bytes += record;
-  }
-  return bytes;
-}
-
 std::string npy() {
   std::string text = "{'descr': '<i2', 'fortran_order': True, 'shape': (3, 4), }";
   text.resize(117, ' ');
@@ -148,24 +126,6 @@ std::string zip(const std::string& name, const std::string& contents, bool zip64
   return {reinterpret_cast<const char*>(archive.data()), archive.size()};
 }
 
-std::string gzip(const std::string& contents) {
-  const auto packed = raw_deflated(bytes_of(contents));
-  std::string bytes("\x1F\x8B\x08\0\0\0\0\0\0\3", 10);
-  bytes.append(reinterpret_cast<const char*>(packed.data()), packed.size());
-  const auto crc =
-      static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(contents.data()), contents.size()));
-  for (const std::uint32_t word : {crc, static_cast<std::uint32_t>(contents.size())}) {
-    for (unsigned shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(word >> shift & 0xFFU);
-  }
-  return bytes;
-}
-
-/// As written where a format is little-endian.
-template <typename T>
-std::string little(T value) {
-  return {reinterpret_cast<const char*>(&value), sizeof(value)};
-}
-
 const char* const kEhdr =
     "BYTEORDER M\nLAYOUT BIL\nNROWS 3\nNCOLS 4\nNBANDS 1\nNBITS 16\nBANDROWBYTES 8\nTOTALROWBYTES 8\nBANDGAPBYTES 0\n"
     "PIXELTYPE SIGNEDINT\nNODATA -9999\nULXMAP 100.5\nULYMAP 200.5\nXDIM 0.5\nYDIM 0.5\n";
@@ -175,19 +135,10 @@ const char* const kWkt =
 
 /// 4 x 3 shorts named z on evenly spaced x and y, degrees, in netCDF's first format; by columns: longitudes first.
 std::string netcdf(bool by_columns = false) {
-  const auto doubles = [](const std::vector<double>& values) {
-    std::string bytes;
-    for (const double value : values) {
-      std::string stored(sizeof(double), '\0');
-      std::memcpy(stored.data(), &value, sizeof(double));
-      bytes.append(stored.rbegin(), stored.rend());
-    }
-    return bytes;
-  };
   NetcdfBytes file;
   file.dimension("y", 3).dimension("x", 4);
-  file.variable("y", {0}, 6, doubles({10.0, 10.5, 11.0}), {{"units", "degrees_north"}});
-  file.variable("x", {1}, 6, doubles({20.0, 20.5, 21.0, 21.5}), {{"units", "degrees_east"}});
+  file.variable("y", {0}, 6, big_endian<double>({10.0, 10.5, 11.0}), {{"units", "degrees_north"}});
+  file.variable("x", {1}, 6, big_endian<double>({20.0, 20.5, 21.0, 21.5}), {{"units", "degrees_east"}});
   const std::vector<std::uint32_t> dimensions =
       by_columns ? std::vector<std::uint32_t>{1, 0} : std::vector<std::uint32_t>{0, 1};
   file.variable("z", dimensions, 3, counting(12, 2), {{"units", "m"}});
@@ -228,7 +179,7 @@ std::vector<ReaderCase> reader_cases() {
       {"PngGray16", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint16), open_png, {}},
       {"PngPacked", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint8, 3), open_png, packed},
       {"EsriAsciiGrid", "a.asc", esri + numbers, open_ascii_grid, {}},
-      {"GzippedAsciiGrid", "a.asc.gz", gzip(esri + numbers), open_ascii_grid, {}},
+      {"GzippedAsciiGrid", "a.asc.gz", gzipped(esri + numbers), open_ascii_grid, {}},
       {"EhdrHeader", "a.hdr", kEhdr, open_header_grid, {}},
       {"EhdrWorldFile", "a.blw", "0.5\n0\n0\n-0.5\n100.5\n200.5\n", open_header_grid, {}},
       {"EhdrProjection", "a.prj", kWkt, open_header_grid, {}},
@@ -239,7 +190,7 @@ std::vector<ReaderCase> reader_cases() {
       {"Npy", "a.npy", npy(), open_npy, {}},
       {"Npz", "a.npz", zip("z.npy", npy()), open_npz, {}},
       {"NpzZip64", "a.npz", zip("z.npy", npy(), true), open_npz, {}},
-      {"Dted", "a.dt0", dted(), open_dted, {}},
+      {"Dted", "a.dt0", dted_cell(3, 4, [](int c, int p) { return 256 + 10 * c + p; }), open_dted, {}},
       {"Hgt", "N10E010.hgt", counting(25, 2), open_hgt, {}},
       {"ZippedHgt", "N10E010.hgt.zip", zip("N10E010.hgt", counting(25, 2)), open_hgt, {}},
       {"Vrt", "a.vrt", kVrt, open_vrt, {}},
@@ -250,7 +201,7 @@ std::vector<ReaderCase> reader_cases() {
       {"XyzText", "a.xyz", "x y z\n0 0 1\n1 0 2.5\n0 1 3\n1 1 4\n", open_xyz, {}},
       {"Pds4Label", "a.xml", pds4_label("a.dat"), open_pds4, {}},
       {"Pds4Samples", "a.dat", counting(7, 2), open_pds4, {}},
-      {"StreamedAsciiGrid", "a.asc.gz", gzip(esri + numbers), open_ascii_grid, streamed},
+      {"StreamedAsciiGrid", "a.asc.gz", gzipped(esri + numbers), open_ascii_grid, streamed},
       {"ZipOfGrid", "a.zip", zip("d/a.asc", esri + numbers), open_packed, {}},
       {"TarOfGrid", "a.tar", tar_archive({{"d/a.asc", esri + numbers}}), open_packed, {}},
       {"Webp", "a.webp", read_file(data + "small.webp"), open_webp, packed},

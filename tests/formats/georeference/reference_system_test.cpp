@@ -25,6 +25,7 @@
 #include "isohf/raster.h"
 #include "isohf/surface.h"
 #include "support/rasters/memory_source.h"
+#include "support/rasters/place_at.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -143,10 +144,8 @@ TEST_F(UnderstandSystem, AgreesWithGeographicLibOnEveryKindOfGroundProjection) {
     SourceInfo info;
     info.path = "dem";
     info.width = info.height = 2;
-    info.georeference.unit = HorizontalUnit::kDegree;
-    info.georeference.has_origin = true;
-    info.georeference.origin_x = test.ground.west;
-    info.georeference.origin_y = test.ground.north;
+    info.georeference =
+        place_at(Registration::kUnknown, HorizontalUnit::kDegree, test.ground.west, test.ground.north, 1.0);
     understand_ground(info, request);
     const Projection theirs(request.projection.system_map);
     std::uniform_real_distribution<double> longitude(test.ground.west, test.ground.east);
@@ -172,12 +171,7 @@ TEST_F(UnderstandSystem, ProjectionsOnAnotherDatumKeepTheWayThere) {
   SourceInfo info;
   info.path = "dem";
   info.width = info.height = 11;
-  info.georeference.unit = HorizontalUnit::kDegree;
-  info.georeference.has_origin = true;
-  info.georeference.origin_x = 7.0;
-  info.georeference.origin_y = 47.0;
-  info.georeference.spacing_x = info.georeference.spacing_y = 0.1;
-  info.georeference.system.epsg = 4326;
+  info.georeference = place_at(Registration::kUnknown, HorizontalUnit::kDegree, 7.0, 47.0, 0.1, 4326);
   GroundRequest request;
   request.projection = ProjectionRequest::parse("EPSG:21781");
   understand_ground(info, request);
@@ -212,14 +206,7 @@ TEST_F(UnderstandSystem, ArchivesOnAReferenceSystemFindTheirPlacesByIt) {
   MemorySource<float> source(SampleType::kFloat32, 60, 50, [](std::int64_t c, std::int64_t r) {
     return static_cast<double>(c) + 100.0 * static_cast<double>(r);
   });
-  Georeference& place = source.mutable_info().georeference;
-  place.registration = Registration::kArea;
-  place.unit = HorizontalUnit::kDegree;
-  place.spacing_x = place.spacing_y = 0.01;
-  place.has_origin = true;
-  place.origin_x = -74.3;
-  place.origin_y = 41.0;
-  place.system.epsg = 4326;
+  source.mutable_info().georeference = place_at(Registration::kArea, HorizontalUnit::kDegree, -74.3, 41.0, 0.01, 4326);
   ConvertOptions options;
   options.code_type = CodeType::kF32;
   options.plan.ground.projection = ProjectionRequest::parse("EPSG:2263");
@@ -278,12 +265,7 @@ class CylindricalMoon : public UnderstandSystem {
     auto source = std::make_unique<MemorySource<float>>(
         SampleType::kFloat32, width, height, [](std::int64_t c, std::int64_t r) { return static_cast<double>(c + r); });
     Georeference& place = source->mutable_info().georeference;
-    place.unit = HorizontalUnit::kMetre;
-    place.registration = Registration::kArea;
-    place.spacing_x = place.spacing_y = spacing;
-    place.has_origin = true;
-    place.origin_x = west + spacing / 2.0;
-    place.origin_y = north - spacing / 2.0;
+    place = place_at(Registration::kArea, HorizontalUnit::kMetre, west + spacing / 2.0, north - spacing / 2.0, spacing);
     place.system.wkt = "+proj=eqc +lon_0=180 +R=1737400 +units=m";
     place.system.semi_major_axis_m = 1737400.0;
     place.system.inverse_flattening = 0.0;
@@ -389,14 +371,8 @@ TEST_F(UnderstandSystem, GridsLieOnMapsOfOtherDatumsWhereverThesePutThePoles) {
   const auto corners_of = [](double west, double north, const std::string& system) {
     MemorySource<float> source(SampleType::kFloat32, 150, 100,
                                [](std::int64_t c, std::int64_t r) { return static_cast<double>(c + r); });
-    Georeference& place = source.mutable_info().georeference;
-    place.unit = HorizontalUnit::kDegree;
-    place.registration = Registration::kArea;
-    place.spacing_x = place.spacing_y = 1.0 / 1200.0;
-    place.has_origin = true;
-    place.origin_x = west;
-    place.origin_y = north;
-    place.system.epsg = 4326;
+    source.mutable_info().georeference =
+        place_at(Registration::kArea, HorizontalUnit::kDegree, west, north, 1.0 / 1200.0, 4326);
     ConvertOptions options;
     options.code_type = CodeType::kF32;
     const TemporaryFolder folder;
@@ -548,21 +524,11 @@ TEST_F(UnderstandSystem, GroundUnderARectangleHasItsScalesAndItsPlaces) {
 
 TEST_F(UnderstandSystem, AGridMappingOfNetcdfWithoutWktIsOne) {
   const TemporaryFolder folder;
-  const auto big_endian = [](const std::vector<double>& numbers) {
-    std::string bytes;
-    for (const double number : numbers) {
-      for (int shift = 56; shift >= 0; shift -= 8)
-        bytes += static_cast<char>(std::bit_cast<std::uint64_t>(number) >> static_cast<unsigned>(shift) & 0xFFU);
-    }
-    return bytes;
-  };
-  const auto system_of = [&](const std::string& kind,
-                             const std::vector<std::pair<std::string, std::vector<double>>>& of,
-                             const std::string& unit = "m") {
+  const auto system_of = [&](const std::string& kind, const NetcdfBytes::Numbers& of, const std::string& unit = "m") {
     NetcdfBytes file;
     file.dimension("y", 2).dimension("x", 2);
-    file.variable("x", {1}, 6, big_endian({500.0, 600.0}), {{"units", unit}});
-    file.variable("y", {0}, 6, big_endian({4600.0, 4500.0}), {{"units", unit}});
+    file.variable("x", {1}, 6, big_endian<double>({500.0, 600.0}), {{"units", unit}});
+    file.variable("y", {0}, 6, big_endian<double>({4600.0, 4500.0}), {{"units", unit}});
     file.variable("map", {}, 3, "", {{"grid_mapping_name", kind}}, of);
     write_file(folder / "a.nc", file.variable("z", {0, 1}, 3, std::string(8, '\1'), {{"grid_mapping", "map"}}).bytes());
     const auto source = open_raster(folder / "a.nc", {});
@@ -579,8 +545,8 @@ TEST_F(UnderstandSystem, AGridMappingOfNetcdfWithoutWktIsOne) {
   const auto known = understand_system("EPSG:32632");
   EXPECT_NEAR(utm->map_from_geo({10.0, 45.0}).easting * 1000.0, known->map_from_geo({10.0, 45.0}).easting, 1e-5);
   EXPECT_NEAR(utm->map_from_geo({10.0, 45.0}).northing * 1000.0, known->map_from_geo({10.0, 45.0}).northing, 1e-5);
-  const auto expect = [&](const std::string& kind, const std::vector<std::pair<std::string, std::vector<double>>>& of,
-                          const std::string& code, GeoPoint place) {
+  const auto expect = [&](const std::string& kind, const NetcdfBytes::Numbers& of, const std::string& code,
+                          GeoPoint place) {
     const MapPoint found = system_of(kind, of)->map_from_geo(place);
     const MapPoint wanted = understand_system(code)->map_from_geo(place);
     EXPECT_NEAR(found.easting, wanted.easting, 1e-3) << kind;

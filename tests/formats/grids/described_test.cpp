@@ -22,16 +22,20 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-template <typename T>
-std::string stored(const std::vector<T>& values, bool big_endian = false) {
-  std::string bytes;
-  for (const T value : values) {
-    std::string each(sizeof(T), '\0');
-    std::memcpy(each.data(), &value, sizeof(T));
-    if (big_endian) std::reverse(each.begin(), each.end());
-    bytes += each;
-  }
-  return bytes;
+/// The text of a virtual raster: what stands in its one band, and before it.
+std::string vrt_of(const std::string& size, const std::string& type, const std::string& band,
+                   const std::string& before = {}) {
+  const auto x = size.find('x');
+  return fmt::format(R"(<VRTDataset rasterXSize="{}" rasterYSize="{}">{}<VRTRasterBand dataType="{}" band="1">{})"
+                     R"(</VRTRasterBand></VRTDataset>)",
+                     size.substr(0, x), size.substr(x + 1), before, type, band);
+}
+
+/// A source in one; `more` behind the number of its band.
+std::string vrt_source(const std::string& file, const std::string& more = {}, const char* kind = "SimpleSource") {
+  return fmt::format(
+      R"(<{0}><SourceFilename relativeToVRT="1">{1}</SourceFilename><SourceBand>1</SourceBand>{2}</{0}>)", kind, file,
+      more);
 }
 
 class Described : public ::testing::Test {
@@ -44,6 +48,13 @@ class Described : public ::testing::Test {
     return failure_of(folder_.path(), code, [&] { read_corner(*open(name)); });
   }
 
+  /// Opens the file with a variable z of shorts over both dimensions.
+  [[nodiscard]] std::unique_ptr<HeightSource> open_z(NetcdfBytes& file, const std::string& shorts,
+                                                     const NetcdfBytes::Texts& texts = {},
+                                                     const NetcdfBytes::Numbers& numbers = {}) const {
+    return open_z(file, shorts, texts, numbers);
+  }
+
   TemporaryFolder folder_;
 };
 
@@ -54,7 +65,7 @@ std::string envi(const std::string& more) {
 }
 
 TEST_F(Envi, FeetOfMapInfoAreUsSurveyFeet) {
-  write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
+  write("a.dat", stored_bytes<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
   write("a.hdr", envi("map info = {State Plane (NAD 83), 1, 1, 600000, 400000, 10, 10, 3104, units=Feet}\n"));
   const Georeference place = open("a.dat")->info().georeference;
   EXPECT_EQ(place.unit, HorizontalUnit::kMetre);
@@ -64,7 +75,7 @@ TEST_F(Envi, FeetOfMapInfoAreUsSurveyFeet) {
 }
 
 TEST_F(Envi, SystemsThatMapInfoNamesAreTakenOrTold) {
-  write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
+  write("a.dat", stored_bytes<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
 #if defined(ISOHF_WITH_PROJ)
   set_module_folder(ISOHF_BIN_DIR);
   write("a.hdr", envi("map info = {UTM, 1, 1, 500000, 4900000, 30, 30, 12, North, North America 1927}\n"));
@@ -80,7 +91,7 @@ TEST_F(Envi, SystemsThatMapInfoNamesAreTakenOrTold) {
 }
 
 TEST_F(Envi, RowsFromTheSouthAreTurned) {
-  write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
+  write("a.dat", stored_bytes<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
   for (const char* way : {"10, -20, 32, North, WGS-84", "10, 20, 32, North, WGS-84, rotation=180"}) {
     write("a.hdr", envi(std::string("map info = {UTM, 1, 1, 500000, 4000000, ") + way + "}\n"));
     const auto source = open("a.dat");
@@ -95,7 +106,7 @@ TEST_F(Envi, RowsFromTheSouthAreTurned) {
 }
 
 TEST_F(Envi, GainsAndOffsetsAreTheBandsOwn) {
-  write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
+  write("a.dat", stored_bytes<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
   write("a.hdr", envi("data gain values = {1, 0.5}\ndata offset values = {0, 100}\nband names = {height, slope}\n"));
   const auto second = open("a.dat", "slope");
   EXPECT_THAT(values_of(*second), ElementsAre(2, 4, 6, 8));
@@ -123,7 +134,7 @@ TEST_F(Envi, BytesHaveSignsWhereGdalsFileSaysSo) {
 }
 
 TEST_F(Envi, TheBandWhoseNameSaysElevationsIsRead) {
-  write("a.dat", stored<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
+  write("a.dat", stored_bytes<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
   write("a.hdr", envi("band names = {slope, Elevation (m)}\n"));
   EXPECT_THAT(values_of(*open("a.dat")), ElementsAre(2, 4, 6, 8));
   EXPECT_EQ(open("a.dat")->info().channel, "Elevation (m)");
@@ -135,18 +146,15 @@ TEST_F(Envi, TheBandWhoseNameSaysElevationsIsRead) {
         R"(<PAMDataset><PAMRasterBand band="2"><Description>z</Description></PAMRasterBand></PAMDataset>)");
   EXPECT_THAT(values_of(*open("a.dat")), ElementsAre(2, 4, 6, 8));
   // A virtual raster names its band by a number.
-  write("a.vrt",
-        R"(<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Int16" band="1"><SimpleSource>)"
-        R"(<SourceFilename relativeToVRT="1">a.dat</SourceFilename><SourceBand>1</SourceBand></SimpleSource>)"
-        R"(</VRTRasterBand></VRTDataset>)");
+  write("a.vrt", vrt_of("2x2", "Int16", vrt_source("a.dat")));
   EXPECT_THAT(values_of(*open("a.vrt")), ElementsAre(1, 3, 5, 7));
 }
 
 TEST_F(Envi, WholeNumbersOf64BitsAreFloat64) {
-  write("a.dat", stored<std::int64_t>({1, -2, 1LL << 50, 4}, true));
+  write("a.dat", big_endian<std::int64_t>({1, -2, 1LL << 50, 4}));
   write("a.hdr", "ENVI\nsamples = 2\nlines = 2\ndata type = 14\nbyte order = 1\n");
   EXPECT_THAT(values_of(*open("a.dat")), ElementsAre(1, -2, 0x1p50, 4));
-  write("a.dat", stored<std::int64_t>({1, -2, (1LL << 60) + 1, 4}, true));
+  write("a.dat", big_endian<std::int64_t>({1, -2, (1LL << 60) + 1, 4}));
   EXPECT_THAT(failure("a.dat"), HasSubstr("sample (0, 1) is 1152921504606846977, which float64 does not hold"));
 }
 
@@ -155,9 +163,9 @@ using Netcdf = Described;
 TEST_F(Netcdf, LongitudesMayComeBeforeLatitudes) {
   NetcdfBytes file;
   file.dimension("lon", 3).dimension("lat", 2);
-  file.variable("lon", {0}, 6, stored<double>({10.0, 10.5, 11.0}, true), {{"units", "degrees_east"}});
-  file.variable("lat", {1}, 6, stored<double>({40.0, 40.5}, true), {{"units", "degrees_north"}});
-  file.variable("z", {0, 1}, 3, stored<std::int16_t>({1, 2, 3, 4, 5, 6}, true), {});
+  file.variable("lon", {0}, 6, big_endian<double>({10.0, 10.5, 11.0}), {{"units", "degrees_east"}});
+  file.variable("lat", {1}, 6, big_endian<double>({40.0, 40.5}), {{"units", "degrees_north"}});
+  file.variable("z", {0, 1}, 3, big_endian<std::int16_t>({1, 2, 3, 4, 5, 6}), {});
   write("a.nc", file.bytes());
   const auto source = open("a.nc");
   ASSERT_EQ(source->info().width, 3);
@@ -172,8 +180,8 @@ TEST_F(Netcdf, LongitudesMayComeBeforeLatitudes) {
 TEST_F(Netcdf, GmtGridsFromBeforeCfAreRefusedWithTheCommandThatConvertsThem) {
   NetcdfBytes file;
   file.dimension("side", 2).dimension("xysize", 6);
-  file.variable("x_range", {0}, 6, stored<double>({0.0, 2.0}, true), {});
-  file.variable("dimension", {0}, 4, stored<std::int32_t>({3, 2}, true), {});
+  file.variable("x_range", {0}, 6, big_endian<double>({0.0, 2.0}), {});
+  file.variable("dimension", {0}, 4, big_endian<std::int32_t>({3, 2}), {});
   write("a.grd", file.variable("z", {1}, 5, std::string(24, '\1'), {}).bytes());
   EXPECT_THAT(failure("a.grd"),
               HasSubstr("a GMT grid from before CF; gmt grdconvert " + folder_ / "a.grd" + " OUT.nc"));
@@ -185,8 +193,8 @@ TEST_F(Netcdf, CoordinatesOfFloat32MayBeRounded) {
     for (int i = 0; i < 5; ++i) longitudes.push_back(static_cast<float>(179.0 + step * i + (i == 2 ? jitter : 0.0)));
     NetcdfBytes file;
     file.dimension("lat", 2).dimension("lon", 5);
-    file.variable("lon", {1}, 5, stored<float>(longitudes, true), {{"units", "degrees_east"}});
-    file.variable("lat", {0}, 6, stored<double>({1.0, 1.0 - step}, true), {{"units", "degrees_north"}});
+    file.variable("lon", {1}, 5, big_endian<float>(longitudes), {{"units", "degrees_east"}});
+    file.variable("lat", {0}, 6, big_endian<double>({1.0, 1.0 - step}), {{"units", "degrees_north"}});
     file.variable("z", {0, 1}, 3, std::string(20, '\1'), {});
     return file.bytes();
   };
@@ -205,50 +213,45 @@ NetcdfBytes netcdf_grid(const std::vector<double>& longitudes, const std::vector
   NetcdfBytes file;
   file.dimension("lat", static_cast<std::uint32_t>(latitudes.size()));
   file.dimension("lon", static_cast<std::uint32_t>(longitudes.size()));
-  file.variable("lon", {1}, 6, stored<double>(longitudes, true), {{"units", "degrees_east"}});
-  file.variable("lat", {0}, 6, stored<double>(latitudes, true), {{"units", "degrees_north"}});
+  file.variable("lon", {1}, 6, big_endian<double>(longitudes), {{"units", "degrees_east"}});
+  file.variable("lat", {0}, 6, big_endian<double>(latitudes), {{"units", "degrees_north"}});
   return file;
 }
 
 TEST_F(Netcdf, LongitudesMayGoOnAtMinus180) {
   NetcdfBytes file = netcdf_grid({179.0, 180.0, -179.0}, {1.0, 0.0});
-  write("a.nc", file.variable("z", {0, 1}, 3, std::string(12, '\1'), {}).bytes());
-  const Georeference place = open("a.nc")->info().georeference;
+  const Georeference place = open_z(file, std::string(12, '\1'))->info().georeference;
   EXPECT_EQ(place.origin_x, 179.0);
   EXPECT_EQ(place.spacing_x, 1.0);
 }
 
 TEST_F(Netcdf, UnevenRowsFromTheSouthAreTurnedToo) {
   NetcdfBytes file = netcdf_grid({1.0, 2.0}, {0.0, 1.0, 2.5});
-  write("a.nc", file.variable("z", {0, 1}, 3, stored<std::int16_t>({1, 2, 3, 4, 5, 6}, true), {}).bytes());
-  const auto source = open("a.nc");
+  const auto source = open_z(file, big_endian<std::int16_t>({1, 2, 3, 4, 5, 6}));
   EXPECT_THAT(values_of(*source), ElementsAre(5, 6, 3, 4, 1, 2));
   EXPECT_FALSE(source->info().georeference.has_origin);
 }
 
 TEST_F(Netcdf, WithoutCoordinatesTheFirstRowIsTheSouthernmost) {
-  const std::string samples = stored<std::int16_t>({1, 2, 3, 4, 5, 6}, true);
+  const std::string samples = big_endian<std::int16_t>({1, 2, 3, 4, 5, 6});
   for (const bool has_columns : {false, true}) {
     NetcdfBytes file;
     file.dimension("y", 3).dimension("x", 2);
-    if (has_columns) file.variable("x", {1}, 6, stored<double>({1.0, 2.0}, true), {});
-    write("a.nc", file.variable("z", {0, 1}, 3, samples, {}).bytes());
-    const auto source = open("a.nc");
+    if (has_columns) file.variable("x", {1}, 6, big_endian<double>({1.0, 2.0}), {});
+    const auto source = open_z(file, samples);
     EXPECT_THAT(values_of(*source), ElementsAre(5, 6, 3, 4, 1, 2));
     ASSERT_EQ(source->info().warnings.size(), 1U);
     EXPECT_THAT(source->info().warnings.front(), HasSubstr("the first is taken for the southernmost, as GDAL and GMT"));
   }
   NetcdfBytes file;  // rows that say where they lie are followed
-  file.dimension("y", 3).dimension("x", 2).variable("y", {0}, 6, stored<double>({3.0, 2.0, 1.0}, true), {});
-  write("a.nc", file.variable("z", {0, 1}, 3, samples, {}).bytes());
-  EXPECT_THAT(values_of(*open("a.nc")), ElementsAre(1, 2, 3, 4, 5, 6));
+  file.dimension("y", 3).dimension("x", 2).variable("y", {0}, 6, big_endian<double>({3.0, 2.0, 1.0}), {});
+  EXPECT_THAT(values_of(*open_z(file, samples)), ElementsAre(1, 2, 3, 4, 5, 6));
 }
 
 TEST_F(Netcdf, LatitudesBeyondAPoleAreTold) {
   for (const double north : {90.0, 90.5}) {
     NetcdfBytes file = netcdf_grid({1.0, 2.0}, {north, north - 1.0});
-    write("a.nc", file.variable("z", {0, 1}, 3, stored<std::int16_t>({1, 2, 3, 4}, true), {}).bytes());
-    const auto source = open("a.nc");
+    const auto source = open_z(file, big_endian<std::int16_t>({1, 2, 3, 4}));
     const auto& warnings = source->info().warnings;
     ASSERT_EQ(warnings.size(), north > 90.0 ? 1U : 0U);
     if (!warnings.empty()) {
@@ -260,50 +263,46 @@ TEST_F(Netcdf, LatitudesBeyondAPoleAreTold) {
 TEST_F(Netcdf, CoordinatesMayBePacked) {
   NetcdfBytes file;
   file.dimension("lat", 2).dimension("lon", 3);
-  file.variable("lon", {1}, 3, stored<std::int16_t>({0, 5, 10}, true), {{"units", "degrees_east"}},
+  file.variable("lon", {1}, 3, big_endian<std::int16_t>({0, 5, 10}), {{"units", "degrees_east"}},
                 {{"scale_factor", {0.1}}, {"add_offset", {10.0}}});
-  file.variable("lat", {0}, 6, stored<double>({50.5, 50.0}, true), {{"units", "degrees_north"}});
-  write("a.nc", file.variable("z", {0, 1}, 3, std::string(12, '\1'), {}).bytes());
-  EXPECT_EQ(open("a.nc")->info().georeference.origin_x, 10.0);
-  EXPECT_NEAR(open("a.nc")->info().georeference.spacing_x, 0.5, 1e-12);
+  file.variable("lat", {0}, 6, big_endian<double>({50.5, 50.0}), {{"units", "degrees_north"}});
+  const auto source = open_z(file, std::string(12, '\1'));
+  EXPECT_EQ(source->info().georeference.origin_x, 10.0);
+  EXPECT_NEAR(source->info().georeference.spacing_x, 0.5, 1e-12);
 }
 
 TEST_F(Netcdf, EveryMissingValueIsAVoidAlsoOfUnsignedSamples) {
   NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
-  const std::string samples = stored<std::int16_t>({1, -1, -9, 4}, true);
-  write("a.nc",
-        file.variable("z", {0, 1}, 3, samples, {{"_Unsigned", "true"}}, {{"missing_value", {-1.0, -9.0}}}).bytes());
-  const auto source = open("a.nc");
+  const std::string samples = big_endian<std::int16_t>({1, -1, -9, 4});
+  const auto source = open_z(file, samples, {{"_Unsigned", "true"}}, {{"missing_value", {-1.0, -9.0}}});
   EXPECT_EQ(source->info().sample_type, SampleType::kUint16);
   EXPECT_THAT(source->info().void_values, ElementsAre(65535, 65527));
 }
 
 TEST_F(Netcdf, ValuesOutsideTheValidRangeAreVoid) {
-  const std::string samples = stored<std::int16_t>({1, 1500, -9, 40}, true);
+  const std::string samples = big_endian<std::int16_t>({1, 1500, -9, 40});
   for (const auto& [key, list] : std::vector<std::pair<std::string, std::vector<double>>>{
            {"valid_range", {0.0, 100.0}}, {"valid_min", {0.0}}, {"valid_max", {100.0}}}) {
     NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
-    write("a.nc", file.variable("z", {0, 1}, 3, samples, {}, {{key, list}}).bytes());
-    const auto source = open("a.nc");
+    const auto source = open_z(file, samples, {}, {{key, list}});
     EXPECT_EQ(is_void(source->info(), 1500.0), key != "valid_min") << key;
     EXPECT_EQ(is_void(source->info(), -9.0), key != "valid_max") << key;
     EXPECT_FALSE(is_void(source->info(), 40.0)) << key;
   }
   NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
-  write("a.nc", file.variable("z", {0, 1}, 3, stored<std::int16_t>({1, -5536, -9, 4}, true), {{"_Unsigned", "true"}},
-                              {{"valid_range", {1.0, -5536.0}}})
-                    .bytes());
-  EXPECT_EQ(open("a.nc")->info().valid_max, 60000.0);
+  EXPECT_EQ(open_z(file, big_endian<std::int16_t>({1, -5536, -9, 4}), {{"_Unsigned", "true"}},
+                   {{"valid_range", {1.0, -5536.0}}})
+                ->info()
+                .valid_max,
+            60000.0);
 }
 
 TEST_F(Netcdf, DepthsAreNegativeElevations) {
   for (const auto& [key, value] : {std::pair("positive", "down"), {"standard_name", "sea_floor_depth_below_geoid"}}) {
     NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
-    const std::string samples = stored<std::int16_t>({1, 2, 3, 4}, true);
-    write("a.nc", file.variable("z", {0, 1}, 3, samples, {{key, value}, {"units", "m"}},
-                                {{"scale_factor", {0.5}}, {"add_offset", {10.0}}})
-                      .bytes());
-    const auto source = open("a.nc");
+    const std::string samples = big_endian<std::int16_t>({1, 2, 3, 4});
+    const auto source =
+        open_z(file, samples, {{key, value}, {"units", "m"}}, {{"scale_factor", {0.5}}, {"add_offset", {10.0}}});
     EXPECT_EQ(source->info().z_scale, -0.5) << key;
     EXPECT_EQ(source->info().z_offset, -10.0) << key;
     EXPECT_THAT(source->info().warnings, ElementsAre(HasSubstr("depths, positive down")));
@@ -312,16 +311,15 @@ TEST_F(Netcdf, DepthsAreNegativeElevations) {
 
 TEST_F(Netcdf, DepthsWithoutAnOffsetHaveNone) {
   NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
-  write("a.nc", file.variable("z", {0, 1}, 3, std::string(8, '\1'), {{"positive", "down"}}).bytes());
-  EXPECT_FALSE(std::signbit(open("a.nc")->info().z_offset));
+  EXPECT_FALSE(std::signbit(open_z(file, std::string(8, '\1'), {{"positive", "down"}})->info().z_offset));
 }
 
 TEST_F(Netcdf, UnitsOfCoordinatesAreReadOrTold) {
   const auto with = [&](const std::string& axis, const std::string& unit) {
     NetcdfBytes file;
     file.dimension("y", 2).dimension(axis, 2);
-    file.variable(axis, {1}, 6, stored<double>({0.25, 0.5}, true), {{"units", unit}});
-    file.variable("y", {0}, 6, stored<double>({0.75, 0.5}, true), {{"units", unit}});
+    file.variable(axis, {1}, 6, big_endian<double>({0.25, 0.5}), {{"units", unit}});
+    file.variable("y", {0}, 6, big_endian<double>({0.75, 0.5}), {{"units", unit}});
     file.variable("z", {0, 1}, 3, std::string(8, '\1'), {});
     write("a.nc", file.bytes());
     return open("a.nc");
@@ -351,8 +349,7 @@ TEST_F(Netcdf, UnitsOfCoordinatesAreReadOrTold) {
 TEST_F(Netcdf, DegreesOfARotatedGridAreNone) {
   NetcdfBytes file = netcdf_grid({1.0, 2.0}, {1.0, 0.0});
   file.variable("rotated", {}, 3, "", {{"grid_mapping_name", "rotated_latitude_longitude"}});
-  write("a.nc", file.variable("z", {0, 1}, 3, std::string(8, '\1'), {{"grid_mapping", "rotated"}}).bytes());
-  const auto source = open("a.nc");
+  const auto source = open_z(file, std::string(8, '\1'), {{"grid_mapping", "rotated"}});
   EXPECT_EQ(source->info().georeference.unit, HorizontalUnit::kUnknown);
   ASSERT_EQ(source->info().warnings.size(), 1U);
   EXPECT_THAT(source->info().warnings[0], HasSubstr("its degrees are those of a rotated grid (gdalwarp turns it)"));
@@ -434,19 +431,15 @@ TEST_F(Netcdf4, LongitudesMayComeBeforeLatitudes) {
 using Vrt = Described;
 
 TEST_F(Vrt, NodataOf15DigitsIsTheFloatThatItMeans) {
-  write("a.dat", stored<float>({1.0F, -3.4028234663852886e38F, 0.1F, 4.0F}));
+  write("a.dat", stored_bytes<float>({1.0F, -3.4028234663852886e38F, 0.1F, 4.0F}));
   write("a.hdr", "ENVI\nsamples = 2\nlines = 2\ndata type = 4\n");
   const auto vrt = [&](const std::string& nodata) {
-    write("a.vrt",
-          fmt::format(R"(<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Float32" band="1">)"
-                      R"(<NoDataValue>-9</NoDataValue><ComplexSource><SourceFilename relativeToVRT="1">a.dat)"
-                      R"(</SourceFilename><SourceBand>1</SourceBand><NODATA>{}</NODATA></ComplexSource>)"
-                      R"(</VRTRasterBand></VRTDataset>)",
-                      nodata));
+    const std::string source = vrt_source("a.dat", "<NODATA>" + nodata + "</NODATA>", "ComplexSource");
+    write("a.vrt", vrt_of("2x2", "Float32", "<NoDataValue>-9</NoDataValue>" + source));
     return values_of(*open("a.vrt"));
   };
   EXPECT_THAT(vrt("-3.40282346638529e+38"), ElementsAre(1.0, -9.0, 0.1F, 4.0));
-  write("a.dat", stored<float>({1.0F, 2.0F, 0.1F, 4.0F}));
+  write("a.dat", stored_bytes<float>({1.0F, 2.0F, 0.1F, 4.0F}));
   EXPECT_THAT(vrt("0.100000001490116"), ElementsAre(1.0, 2.0, -9.0, 4.0));
   EXPECT_THAT(vrt("0.11"), ElementsAre(1.0, 2.0, 0.1F, 4.0));
 }
@@ -458,12 +451,8 @@ TEST_F(Vrt, BytesHaveSignsWhereItOrTheSourceSaysSo) {
   // The second is what gdalbuildvrt writes.
   for (const char* sign :
        {R"(<Metadata domain="IMAGE_STRUCTURE"><MDI key="PIXELTYPE">SIGNEDBYTE</MDI></Metadata>)", ""}) {
-    write("a.vrt",
-          fmt::format(R"(<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Byte" band="1">{})"
-                      R"(<NoDataValue>-5</NoDataValue><SimpleSource><SourceFilename relativeToVRT="1">a.npy)"
-                      R"(</SourceFilename><SourceBand>1</SourceBand><SourceProperties DataType="Byte"/>)"
-                      R"(</SimpleSource></VRTRasterBand></VRTDataset>)",
-                      sign));
+    const std::string source = vrt_source("a.npy", R"(<SourceProperties DataType="Byte"/>)");
+    write("a.vrt", vrt_of("2x2", "Byte", std::string(sign) + "<NoDataValue>-5</NoDataValue>" + source));
     EXPECT_THAT(values_of(*open("a.vrt")), ElementsAre(-1, 1, -5, -128));
     EXPECT_THAT(open("a.vrt")->info().void_values, ElementsAre(-5));
     EXPECT_TRUE(open("a.vrt")->info().warnings.empty());
@@ -471,13 +460,10 @@ TEST_F(Vrt, BytesHaveSignsWhereItOrTheSourceSaysSo) {
 }
 
 TEST_F(Vrt, WhatGdalbuildvrtDoesNotWriteIsRefusedWithACommand) {
-  write("a.dat", stored<float>({1.0F, 2.5F, 300.0F, 4.0F}));
+  write("a.dat", stored_bytes<float>({1.0F, 2.5F, 300.0F, 4.0F}));
   write("a.hdr", "ENVI\nsamples = 2\nlines = 2\ndata type = 4\n");
   const auto vrt = [&](const std::string& type, const std::string& more, const std::string& file = "a.dat") {
-    write("a.vrt", fmt::format(R"(<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="{}" band="1">)"
-                               R"(<ComplexSource><SourceFilename relativeToVRT="1">{}</SourceFilename>)"
-                               R"(<SourceBand>1</SourceBand>{}</ComplexSource></VRTRasterBand></VRTDataset>)",
-                               type, file, more));
+    write("a.vrt", vrt_of("2x2", type, vrt_source(file, more, "ComplexSource")));
     return failure("a.vrt");
   };
   const std::string command = "; gdal_translate " + folder_ / "a.vrt" + " OUT.tif makes a GeoTIFF of it";
@@ -496,8 +482,8 @@ TEST_F(Vrt, WhatGdalbuildvrtDoesNotWriteIsRefusedWithACommand) {
 
 TEST_F(Vrt, RowsFromTheSouthAreRefusedByTheirNumber) {
   write("a.vrt",
-        R"(<VRTDataset rasterXSize="2" rasterYSize="2"><GeoTransform> 4.9000000000000000e+05, 3.0000000000e+01)"
-        R"(, 0.0, 5.0e+06, 0.0, 3.0e+01</GeoTransform><VRTRasterBand dataType="Byte" band="1"/></VRTDataset>)");
+        vrt_of("2x2", "Byte", "",
+               "<GeoTransform> 4.9000000000000000e+05, 3.0000000000e+01, 0.0, 5.0e+06, 0.0, 3.0e+01</GeoTransform>"));
   EXPECT_THAT(failure("a.vrt"), HasSubstr("a dy of 30 and"));
 }
 
@@ -516,18 +502,16 @@ TEST_F(Vrt, MoreSourcesThanMayBeOpenLieOverEachOtherInTheirOrder) {
         expected.at(static_cast<std::size_t>(row + top)).at(static_cast<std::size_t>(2 * i + column)) = samples.back();
       }
     }
-    write(fmt::format("{}.dat", i), stored<std::int16_t>(samples));
+    write(fmt::format("{}.dat", i), stored_bytes<std::int16_t>(samples));
     write(fmt::format("{}.hdr", i), fmt::format("ENVI\nsamples = 3\nlines = {}\ndata type = 2\n", kRows - top));
-    sources += fmt::format(R"(<SimpleSource><SourceFilename relativeToVRT="1">{}.dat</SourceFilename>)"
-                           R"(<SourceBand>1</SourceBand><SourceProperties BlockYSize="{}"/>)"
-                           R"(<SrcRect xOff="0" yOff="0" xSize="3" ySize="{}"/>)"
-                           R"(<DstRect xOff="{}" yOff="{}" xSize="3" ySize="{}"/></SimpleSource>)",
-                           i, i % 2 + 1, kRows - top, 2 * i, top, kRows - top);
+    const std::string place =
+        fmt::format(R"(<SourceProperties BlockYSize="{0}"/><SrcRect xOff="0" yOff="0" xSize="3" ySize="{1}"/>)"
+                    R"(<DstRect xOff="{2}" yOff="{3}" xSize="3" ySize="{1}"/>)",
+                    i % 2 + 1, kRows - top, 2 * i, top);
+    sources += vrt_source(fmt::format("{}.dat", i), place);
   }
   write("a.vrt",
-        fmt::format(R"(<VRTDataset rasterXSize="{}" rasterYSize="{}"><VRTRasterBand dataType="Int16" band="1">)"
-                    R"(<NoDataValue>0</NoDataValue>{}</VRTRasterBand></VRTDataset>)",
-                    2 * kFiles + 1, kRows, sources));
+        vrt_of(fmt::format("{}x{}", 2 * kFiles + 1, kRows), "Int16", "<NoDataValue>0</NoDataValue>" + sources));
   const auto source = open("a.vrt");
   for (const Window& window : {Window{0, 0, 2 * kFiles + 1, kRows}, Window{0, 0, 2 * kFiles + 1, 1},
                                Window{0, 3, 2 * kFiles + 1, 1}, Window{0, 2, 2 * kFiles + 1, 1}, Window{7, 1, 131, 3},
@@ -542,13 +526,10 @@ TEST_F(Vrt, MoreSourcesThanMayBeOpenLieOverEachOtherInTheirOrder) {
 }
 
 TEST_F(Vrt, TakesWhatItMayKeepWhateverBlocksItClaims) {
-  write("a.dat", stored<std::int16_t>({1}));
+  write("a.dat", stored_bytes<std::int16_t>({1}));
   write("a.hdr", "ENVI\nsamples = 1\nlines = 1\ndata type = 2\n");
-  write(
-      "a.vrt",
-      R"(<VRTDataset rasterXSize="100000" rasterYSize="100000"><VRTRasterBand dataType="Int16" band="1"><SimpleSource>)"
-      R"(<SourceFilename relativeToVRT="1">a.dat</SourceFilename><SourceBand>1</SourceBand>)"
-      R"(<SourceProperties BlockYSize="100000"/></SimpleSource></VRTRasterBand></VRTDataset>)");
+  const std::string block = R"(<SourceProperties BlockYSize="100000"/>)";
+  write("a.vrt", vrt_of("100000x100000", "Int16", vrt_source("a.dat", block)));
   const auto source = open("a.vrt");
   constexpr std::uint64_t kMebibyte = 1U << 20U;
   EXPECT_LE(source->buffer_bytes(kMebibyte), 18 * kMebibyte);  // a strip of 8 times the limit, twice
@@ -558,7 +539,7 @@ TEST_F(Vrt, TakesWhatItMayKeepWhateverBlocksItClaims) {
 using Pds4 = Described;
 
 TEST_F(Pds4, ReadsTheArrayThatTheLabelDescribes) {
-  write("a.dat", "xy" + stored<std::int16_t>({1, 2, 3, -32768, 5, 6}, true));
+  write("a.dat", "xy" + big_endian<std::int16_t>({1, 2, 3, -32768, 5, 6}));
   write("a.xml", pds4_label("a.dat"));
   for (const char* name : {"a.xml", "a.dat"}) {
     const auto source = open(name);
@@ -582,7 +563,7 @@ TEST_F(Pds4, ReadsTheArrayThatTheLabelDescribes) {
 }
 
 TEST_F(Pds4, AxesComeInAnyOrderAndRowsFromTheBottom) {
-  write("a.dat", "xy" + stored<std::int16_t>({1, 10, 2, 20, 3, 30, 4, 40, 5, 50, 6, 60}, true));
+  write("a.dat", "xy" + big_endian<std::int16_t>({1, 10, 2, 20, 3, 30, 4, 40, 5, 50, 6, 60}));
   Pds4Options options;
   options.axes = {{"Line", 2}, {"Sample", 3}, {"Band", 2}};
   write("a.xml", pds4_label("a.dat", options));
@@ -600,7 +581,7 @@ TEST_F(Pds4, AxesComeInAnyOrderAndRowsFromTheBottom) {
 }
 
 TEST_F(Pds4, ConstantsMayBeBits) {
-  write("a.dat", "xy" + stored<float>({1.0F, -3.4028226550889045e38F, 3.0F, 4.0F, 5.0F, 6.0F}));
+  write("a.dat", "xy" + stored_bytes<float>({1.0F, -3.4028226550889045e38F, 3.0F, 4.0F, 5.0F, 6.0F}));
   Pds4Options options;
   options.type = "IEEE754LSBSingle";
   for (const char* bits : {"16#FF7FFFFB#", "0xFF7FFFFB", "-3.4028226550889045e+38"}) {

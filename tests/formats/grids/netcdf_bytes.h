@@ -1,16 +1,37 @@
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <cstring>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace isohf::test {
 
+template <typename T>
+std::string stored_bytes(const std::vector<T>& values, bool is_big_endian = false) {
+  std::string bytes;
+  for (const T value : values) {
+    std::string each(sizeof(T), '\0');
+    std::memcpy(each.data(), &value, sizeof(T));
+    if (is_big_endian) std::reverse(each.begin(), each.end());
+    bytes += each;
+  }
+  return bytes;
+}
+template <typename T>
+std::string big_endian(const std::vector<T>& values) {
+  return stored_bytes(values, true);
+}
+
 /// A netCDF file in the first of its classic formats.
 class NetcdfBytes {
  public:
+  using Texts = std::vector<std::pair<std::string, std::string>>;
+  using Numbers = std::vector<std::pair<std::string, std::vector<double>>>;
+
   NetcdfBytes& dimension(const std::string& name, std::uint32_t size) {
     dimensions_ += text(name) + word(size);
     ++dimension_count_;
@@ -18,8 +39,7 @@ class NetcdfBytes {
   }
   /// type  5: float, 6: double, 3: short; samples are big-endian
   NetcdfBytes& variable(const std::string& name, const std::vector<std::uint32_t>& dimensions, std::uint32_t type,
-                        std::string samples, const std::vector<std::pair<std::string, std::string>>& attributes,
-                        const std::vector<std::pair<std::string, std::vector<double>>>& numbers = {}) {
+                        std::string samples, const Texts& attributes, const Numbers& numbers = {}) {
     std::string head = text(name) + word(static_cast<std::uint32_t>(dimensions.size()));
     for (const std::uint32_t dimension : dimensions) head += word(dimension);
     const std::size_t count = attributes.size() + numbers.size();

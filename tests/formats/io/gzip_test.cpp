@@ -79,6 +79,9 @@ TEST_F(PackedTile, HasTheSameSamplesHeldAndNotInAnyOrder) {
   for (const char* packing : {".gz", ".zip"}) {
     SCOPED_TRACE(packing);
     const auto held = open_raster(plain_ + packing, {});
+    EXPECT_EQ(held->info().format, "SRTM HGT");
+    EXPECT_EQ(held->info().georeference.origin_y, 45.0);
+    EXPECT_EQ(held->info().warnings.size(), 0U);
     const auto streamed = open_raster(plain_ + packing, holding(0));
     const auto dropped = open_raster(plain_ + packing, {});
     (void)read_window(*dropped, {0, 700, kSide, 1});
@@ -110,27 +113,6 @@ TEST_F(PackedTile, SaysWhenItWasChangedWhileItWasRead) {
 }
 
 using Gzip = InFolder;
-
-TEST_F(Gzip, ReadsATileOfSeveralMegabytesInAnyOrder) {
-  const std::string plain_path = folder / "N44E006.hgt";
-  const std::string contents = terrain(std::size_t{1201} * 1201 * 2);
-  write_file(plain_path, contents);
-  write_file(plain_path + ".gz", gzipped(contents));
-  const auto plain = open_raster(plain_path, {});
-  const auto packed = open_raster(plain_path + ".gz", {});
-  EXPECT_EQ(packed->info().format, "SRTM HGT");
-  EXPECT_EQ(packed->info().georeference.origin_y, 45.0);
-  EXPECT_EQ(packed->info().warnings.size(), 0U);
-  std::mt19937 random(9);
-  for (int round = 0; round < 60; ++round) {
-    const std::int64_t row = random() % 1190;
-    const std::int64_t column = random() % 1000;
-    const Window window{column, row, 1 + static_cast<std::int64_t>(random() % 200),
-                        1 + static_cast<std::int64_t>(random() % 11)};
-    ASSERT_EQ(read_window(*packed, window), read_window(*plain, window)) << column << ", " << row;
-  }
-  EXPECT_EQ(read_whole(*packed), read_whole(*plain));
-}
 
 TEST_F(Gzip, HoldsTextGridsWithTheirPrj) {
   write_file(folder / "a.asc.gz", gzipped("ncols 2\nnrows 2\nxllcorner 5\nyllcorner 6\ncellsize 1\n1 2\n3 4\n"));

@@ -8,10 +8,10 @@
 #include "formats/geotiff/tiff_bytes.h"
 #include "formats/photo/photo.h"
 #include "formats/reader_failure.h"
-#include "formats/write/raster_sink.h"
 #include "isohf/archive/textures/picture_codec.h"
 #include "isohf/error.h"
 #include "support/rasters/memory_photo.h"
+#include "support/rasters/raster.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -41,20 +41,12 @@ class NativePhoto : public ::testing::Test {
         for (int c = 0; c < channels; ++c) samples.push_back(static_cast<std::byte>(noise(column, row, c)));
       }
     }
-    const auto sink = create_raster(folder_ / name, spec);
-    sink->write_rows(samples);
-    sink->finish();
+    write_raster(folder_ / name, spec, samples);
     return folder_ / name;
   }
 
   const TemporaryFolder folder_;
 };
-
-std::vector<std::uint8_t> window_of(PhotoSource& photo, const Window& window) {
-  std::vector<std::uint8_t> samples(static_cast<std::size_t>(window.columns * window.rows * photo.info().channels));
-  photo.read_window(window, samples);
-  return samples;
-}
 
 Picture noise_picture(int width, int height, int channels) {
   Picture picture(width, height, channels);
@@ -91,16 +83,9 @@ TEST_F(NativePhoto, ReadsWindowsOfPngAndTiffLargerThanTheCache) {
       ASSERT_EQ(photo->info().channels, channels);
       EXPECT_TRUE(photo->info().warnings.empty());
       photo->set_cache_bytes(1U << 16U);
-      for (const Window& window : {Window{0, 0, 700, 3}, Window{699, 499, 1, 1}, Window{300, 40, 100, 300},
-                                   Window{5, 400, 9, 100}, Window{0, 63, 64, 2}, Window{600, 10, 1, 400}}) {
-        const auto samples = window_of(*photo, window);
-        std::size_t i = 0;
-        for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
-          for (std::int64_t column = window.column; column < window.column + window.columns; ++column) {
-            for (int c = 0; c < channels; ++c) ASSERT_EQ(samples[i++], noise(column, row, c)) << column << " " << row;
-          }
-        }
-      }
+      expect_noise(
+          *photo,
+          {{0, 0, 700, 3}, {699, 499, 1, 1}, {300, 40, 100, 300}, {5, 400, 9, 100}, {0, 63, 64, 2}, {600, 10, 1, 400}});
     }
   }
 }
@@ -139,9 +124,7 @@ TEST_F(NativePhoto, RoundsSixteenBitsAndExpandsPalettesOfPng) {
   spec.width = 6;
   spec.height = 1;
   spec.sample_type = SampleType::kUint16;
-  const auto sink = create_raster(folder_ / "deep.png", spec);
-  sink->write_rows(std::as_bytes(std::span(deep)));
-  sink->finish();
+  write_raster(folder_ / "deep.png", spec, std::as_bytes(std::span(deep)));
   EXPECT_EQ(window_of(*open_photo(folder_ / "deep.png"), {0, 0, 6, 1}),
             (std::vector<std::uint8_t>{0, 255, 100, 100, 101, 1}));
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <atomic>
 #include <functional>
@@ -64,6 +66,26 @@ inline int noise(std::int64_t column, std::int64_t row, int channel) {
   x ^= x >> 12U;
   x *= 0x9E3779B97F4A7C15U;
   return static_cast<int>((x >> 40U) & 255U);
+}
+
+inline std::vector<std::uint8_t> window_of(PhotoSource& photo, const Window& window) {
+  std::vector<std::uint8_t> samples(static_cast<std::size_t>(window.columns * window.rows * photo.info().channels));
+  photo.read_window(window, samples);
+  return samples;
+}
+
+/// The photo is that noise, in each of these windows.
+inline void expect_noise(PhotoSource& photo, std::initializer_list<Window> windows) {
+  for (const Window& window : windows) {
+    const auto samples = window_of(photo, window);
+    std::size_t i = 0;
+    for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
+      for (std::int64_t column = window.column; column < window.column + window.columns; ++column) {
+        for (int c = 0; c < photo.info().channels; ++c)
+          ASSERT_EQ(samples[i++], noise(column, row, c)) << column << " " << row;
+      }
+    }
+  }
 }
 
 }  // namespace isohf::test
