@@ -12,10 +12,10 @@
 #include <string>
 
 #include "formats/reader_failure.h"
-#include "formats/write/raster_sink.h"
 #include "isohf/error.h"
 #include "isohf/picture.h"
 #include "isohf/raster.h"
+#include "support/rasters/raster.h"
 #include "support/rasters/samples.h"
 #include "support/real_files.h"
 #include "support/temporary_folder.h"
@@ -72,9 +72,7 @@ TEST(OpenSource, NoticesAFileThatChangesWhileItIsRead) {
   for (const std::string name : {"a.tif", "a.png", "a.r16", "a.npy", "a.asc"}) {
     SCOPED_TRACE(name);
     const std::string path = folder / name;
-    const auto sink = create_raster(path, spec);
-    sink->write_rows(rows);
-    sink->finish();
+    write_raster(path, spec, rows);
     const std::string whole = read_file(path);
     const auto source = open_raster(path, {});
     const Window window = {0, 0, source->info().width, 1};

@@ -5,6 +5,7 @@
 
 #include "formats/reader_failure.h"
 #include "isohf/error.h"
+#include "support/rasters/place_at.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -58,11 +59,7 @@ TEST_F(AuxiliaryMetadata, PlacesTheMiddleOfTheFirstPixel) {
   beside(kAll);
   read_auxiliary_metadata(info_, 0);
   const Georeference& place = info_.georeference;
-  ASSERT_TRUE(place.has_origin);
-  EXPECT_EQ(place.origin_x, 10.25);
-  EXPECT_EQ(place.origin_y, 49.875);
-  EXPECT_EQ(place.spacing_x, 0.5);
-  EXPECT_EQ(place.spacing_y, 0.25);
+  EXPECT_THAT(grid_of(place), ElementsAre(10.25, 49.875, 0.5, 0.25));
   EXPECT_EQ(place.registration, Registration::kPoint);
   EXPECT_EQ(place.unit, HorizontalUnit::kDegree);
   EXPECT_EQ(place.system.epsg, 4326);

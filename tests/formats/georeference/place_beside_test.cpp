@@ -9,6 +9,7 @@
 #include "formats/registry.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "support/rasters/place_at.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -44,11 +45,7 @@ TEST_F(PlaceBeside, WorldFileAndPrjPlaceAPicture) {
     SCOPED_TRACE(picture);
     beside(world, "0.5\n0\n0\n-0.25\n10.25\n50\n");
     const Georeference place = open_raster(folder_ / picture, {})->info().georeference;
-    EXPECT_TRUE(place.has_origin);
-    EXPECT_EQ(place.spacing_x, 0.5);
-    EXPECT_EQ(place.spacing_y, 0.25);
-    EXPECT_EQ(place.origin_x, 10.25);
-    EXPECT_EQ(place.origin_y, 50.0);
+    EXPECT_THAT(grid_of(place), ::testing::ElementsAre(10.25, 50.0, 0.5, 0.25));
     EXPECT_EQ(place.unit, HorizontalUnit::kDegree);
     EXPECT_EQ(place.system.name, "GCS_WGS_1984");
     EXPECT_EQ(place.system.semi_major_axis_m, 6378137.0);

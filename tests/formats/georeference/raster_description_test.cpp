@@ -67,11 +67,7 @@ TEST_F(RasterDescription, GivesAPngPlaceAndMeaning) {
   const Georeference wanted = *picture_spec().georeference;
   EXPECT_EQ(place.registration, wanted.registration);
   EXPECT_EQ(place.unit, wanted.unit);
-  EXPECT_EQ(place.spacing_x, wanted.spacing_x);
-  EXPECT_EQ(place.spacing_y, wanted.spacing_y);
-  EXPECT_TRUE(place.has_origin);
-  EXPECT_EQ(place.origin_x, wanted.origin_x);
-  EXPECT_EQ(place.origin_y, wanted.origin_y);
+  EXPECT_EQ(grid_of(place), grid_of(wanted));
   EXPECT_EQ(place.system.epsg, 4326);
   EXPECT_EQ(info.vertical_unit, "metre");
   EXPECT_THAT(info.warnings, IsEmpty());

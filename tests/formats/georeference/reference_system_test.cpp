@@ -38,6 +38,30 @@ constexpr double kDegree = M_PI / 180.0;
 constexpr double kWgs84 = 6378137.0;
 constexpr double kE2 = 0.00669437999014;  // to its last digit; the tests ask for 1e-9
 
+void expect_near(const MapPoint& found, const MapPoint& expected, double tolerance, const std::string& what = {}) {
+  EXPECT_NEAR(found.easting, expected.easting, tolerance) << what;
+  EXPECT_NEAR(found.northing, expected.northing, tolerance) << what;
+}
+
+/// To a micrometre.
+void expect_same_place(const GeoPoint& found, const GeoPoint& place, const std::string& what = {}) {
+  constexpr double kMicrometre = 1e-6 / 111000.0;
+  EXPECT_NEAR(found.latitude, place.latitude, kMicrometre) << what;
+  EXPECT_NEAR(std::remainder(found.longitude - place.longitude, 360.0) * std::cos(place.latitude * kDegree), 0.0,
+              kMicrometre)
+      << what;
+}
+
+ReferenceSystem system_of(const std::string& text) {
+  ReferenceSystem found;
+  if (text.starts_with("EPSG:")) {
+    found.epsg = std::stoi(text.substr(5));
+  } else {
+    found.wkt = understand_system(text)->description().wkt2;
+  }
+  return found;
+}
+
 class UnderstandSystem : public testing::Test {
  protected:
   UnderstandSystem() { set_module_folder(ISOHF_BIN_DIR); }
@@ -74,9 +98,7 @@ TEST_F(UnderstandSystem, TakesWktOfEveryVersionAndProjStrings) {
   for (const std::string& text :
        {wkt1, understand_system("EPSG:32632")->description().wkt2,
         understand_system("EPSG:32632+5773")->description().wkt2, std::string("+proj=utm +zone=32 +datum=WGS84")}) {
-    const MapPoint found = understand_system(text)->map_from_geo({6.865, 45.833});
-    EXPECT_NEAR(found.easting, expected.easting, 1e-6) << text;
-    EXPECT_NEAR(found.northing, expected.northing, 1e-6) << text;
+    expect_near(understand_system(text)->map_from_geo({6.865, 45.833}), expected, 1e-6, text);
   }
 }
 
@@ -106,13 +128,8 @@ TEST_F(UnderstandSystem, UtmAgreesWithGeographicLibAndComesBack) {
         GeographicLib::UTMUPS::Forward(place.latitude, place.longitude, found_zone, found_north, expected.easting,
                                        expected.northing, zone);
         const MapPoint found = utm->map_from_geo(place);
-        EXPECT_NEAR(found.easting, expected.easting, 1e-6);
-        EXPECT_NEAR(found.northing, expected.northing, 1e-6);
-        const GeoPoint back = utm->geo_from_map(found);
-        constexpr double kMicrometre = 1e-6 / 111000.0;
-        EXPECT_NEAR(back.latitude, place.latitude, kMicrometre);
-        EXPECT_NEAR(std::remainder(back.longitude - place.longitude, 360.0) * std::cos(place.latitude * kDegree), 0.0,
-                    kMicrometre);
+        expect_near(found, expected, 1e-6);
+        expect_same_place(utm->geo_from_map(found), place);
       }
     }
   }
@@ -153,15 +170,9 @@ TEST_F(UnderstandSystem, AgreesWithGeographicLibOnEveryKindOfGroundProjection) {
     for (int i = 0; i < 1000; ++i) {
       const GeoPoint place{longitude(random), latitude(random)};
       const MapPoint a = ours.forward(place);
-      const MapPoint b = theirs.forward(place);
-      ASSERT_NEAR(a.easting, b.easting, 1e-6) << test.request << " at " << place.longitude << " " << place.latitude;
-      ASSERT_NEAR(a.northing, b.northing, 1e-6) << test.request << " at " << place.longitude << " " << place.latitude;
-      const GeoPoint back = theirs.inverse(a);
-      constexpr double kMicrometre = 1e-6 / 111000.0;
-      ASSERT_NEAR(back.latitude, place.latitude, kMicrometre) << test.request;
-      ASSERT_NEAR(std::remainder(back.longitude - place.longitude, 360.0) * std::cos(place.latitude * kDegree), 0.0,
-                  kMicrometre)
-          << test.request;
+      expect_near(a, theirs.forward(place), 1e-6, test.request);
+      expect_same_place(theirs.inverse(a), place, test.request);
+      if (HasFailure()) FAIL() << test.request << " at " << place.longitude << " " << place.latitude;
     }
   }
 }
@@ -182,8 +193,7 @@ TEST_F(UnderstandSystem, ProjectionsOnAnotherDatumKeepTheWayThere) {
   // swisstopo's own example of its formulas, which are good to a metre: 8 43 49.79, 46 02 38.87 is 699999.76 99999.97.
   const MapPoint at =
       Projection(spec).forward({8.0 + 43.0 / 60.0 + 49.79 / 3600.0, 46.0 + 2.0 / 60.0 + 38.87 / 3600.0});
-  EXPECT_NEAR(at.easting, 700000.0, 1.5);
-  EXPECT_NEAR(at.northing, 100000.0, 1.5);
+  expect_near(at, {700000.0, 100000.0}, 1.5);
   const auto again = understand_way(spec.system, spec.ellipsoid);
   EXPECT_EQ(again->map_from_geo({7.5, 46.5}).easting, spec.map->map_from_geo({7.5, 46.5}).easting);
 
@@ -360,9 +370,7 @@ TEST_F(UnderstandSystem, GroundBeyondAGridOfShiftsIsMovedByAWayThatShowsIt) {
     EXPECT_EQ(way.system.operation.find("hgridshift") == std::string::npos, ground.north < 48.0);
     const WayToSystem near = find_way(wgs84, helmert, ground, {});
     const GeoPoint at{ground.west, ground.south};
-    const MapPoint there = way.map->map_from_geo(at);
-    EXPECT_NEAR(there.easting, near.map->map_from_geo(at).easting, 5.0);
-    EXPECT_NEAR(there.northing, near.map->map_from_geo(at).northing, 5.0);
+    expect_near(way.map->map_from_geo(at), near.map->map_from_geo(at), 5.0);
   }
 }
 
@@ -409,9 +417,7 @@ TEST_F(UnderstandSystem, LongitudesCountFromGreenwichInDegreesWhateverTheSystemD
   const GeoPoint paris = lambert->geo_from_map({600000.0, 2200000.0});
   EXPECT_NEAR(paris.longitude, 2.33722917, 1e-8);
   EXPECT_NEAR(paris.latitude, 46.8, 1e-9);  // 52 grads
-  const MapPoint back = lambert->map_from_geo(paris);
-  EXPECT_NEAR(back.easting, 600000.0, 1e-6);
-  EXPECT_NEAR(back.northing, 2200000.0, 1e-6);
+  expect_near(lambert->map_from_geo(paris), {600000.0, 2200000.0}, 1e-6);
 }
 
 TEST_F(UnderstandSystem, CoordinatesAreInTheUnitsAskedFor) {
@@ -524,7 +530,7 @@ TEST_F(UnderstandSystem, GroundUnderARectangleHasItsScalesAndItsPlaces) {
 
 TEST_F(UnderstandSystem, AGridMappingOfNetcdfWithoutWktIsOne) {
   const TemporaryFolder folder;
-  const auto system_of = [&](const std::string& kind, const NetcdfBytes::Numbers& of, const std::string& unit = "m") {
+  const auto mapped = [&](const std::string& kind, const NetcdfBytes::Numbers& of, const std::string& unit = "m") {
     NetcdfBytes file;
     file.dimension("y", 2).dimension("x", 2);
     file.variable("x", {1}, 6, big_endian<double>({500.0, 600.0}), {{"units", unit}});
@@ -535,22 +541,19 @@ TEST_F(UnderstandSystem, AGridMappingOfNetcdfWithoutWktIsOne) {
     EXPECT_TRUE(source->info().warnings.empty()) << source->info().warnings[0];
     return understand_system(source->info().georeference.system.wkt);
   };
-  const auto utm = system_of("transverse_mercator",
-                             {{"latitude_of_projection_origin", {0.0}},
-                              {"longitude_of_central_meridian", {9.0}},
-                              {"scale_factor_at_central_meridian", {0.9996}},
-                              {"false_easting", {500.0}},
-                              {"false_northing", {0.0}}},
-                             "km");
+  const auto utm = mapped("transverse_mercator",
+                          {{"latitude_of_projection_origin", {0.0}},
+                           {"longitude_of_central_meridian", {9.0}},
+                           {"scale_factor_at_central_meridian", {0.9996}},
+                           {"false_easting", {500.0}},
+                           {"false_northing", {0.0}}},
+                          "km");
   const auto known = understand_system("EPSG:32632");
   EXPECT_NEAR(utm->map_from_geo({10.0, 45.0}).easting * 1000.0, known->map_from_geo({10.0, 45.0}).easting, 1e-5);
   EXPECT_NEAR(utm->map_from_geo({10.0, 45.0}).northing * 1000.0, known->map_from_geo({10.0, 45.0}).northing, 1e-5);
   const auto expect = [&](const std::string& kind, const NetcdfBytes::Numbers& of, const std::string& code,
                           GeoPoint place) {
-    const MapPoint found = system_of(kind, of)->map_from_geo(place);
-    const MapPoint wanted = understand_system(code)->map_from_geo(place);
-    EXPECT_NEAR(found.easting, wanted.easting, 1e-3) << kind;
-    EXPECT_NEAR(found.northing, wanted.northing, 1e-3) << kind;
+    expect_near(mapped(kind, of)->map_from_geo(place), understand_system(code)->map_from_geo(place), 1e-3, kind);
   };
   expect("polar_stereographic", {{"straight_vertical_longitude_from_pole", {-45.0}}, {"standard_parallel", {70.0}}},
          "EPSG:3413", {-40.0, 75.0});
@@ -722,27 +725,18 @@ TEST_F(UnderstandSystem, TakesWhatTheUserNames) {
 }
 
 TEST_F(UnderstandSystem, OneParameterMakesAnotherSystem) {
-  const auto system = [](const std::string& text) {
-    ReferenceSystem found;
-    if (text.starts_with("EPSG:")) {
-      found.epsg = std::stoi(text.substr(5));
-    } else {
-      found.wkt = understand_system(text)->description().wkt2;
-    }
-    return found;
-  };
-  const ReferenceSystem utm = system(kUtm17);
-  EXPECT_EQ(are_same(utm, system("EPSG:26917")), true);
-  EXPECT_EQ(are_same(utm, system("EPSG:26918")), false);
-  EXPECT_EQ(are_same(utm, system("EPSG:32617")), false) << "of another datum";
+  const ReferenceSystem utm = system_of(kUtm17);
+  EXPECT_EQ(are_same(utm, system_of("EPSG:26917")), true);
+  EXPECT_EQ(are_same(utm, system_of("EPSG:26918")), false);
+  EXPECT_EQ(are_same(utm, system_of("EPSG:32617")), false) << "of another datum";
   EXPECT_EQ(are_same(utm, ReferenceSystem{}), std::nullopt);
-  const ReferenceSystem laea = system("+proj=laea +lat_0=47 +lon_0=11 +ellps=GRS80");
+  const ReferenceSystem laea = system_of("+proj=laea +lat_0=47 +lon_0=11 +ellps=GRS80");
   EXPECT_EQ(are_same(laea, laea), true);
   for (const char* other :
        {"+proj=laea +lat_0=47.0001 +lon_0=11 +ellps=GRS80", "+proj=laea +lat_0=47 +lon_0=11 +x_0=1 +ellps=GRS80",
         "+proj=laea +lat_0=47 +lon_0=11 +ellps=intl", "+proj=laea +lat_0=47 +lon_0=11 +ellps=GRS80 +units=us-ft",
         "+proj=aeqd +lat_0=47 +lon_0=11 +ellps=GRS80"}) {
-    EXPECT_EQ(are_same(laea, system(other)), false) << other;
+    EXPECT_EQ(are_same(laea, system_of(other)), false) << other;
   }
 }
 
@@ -783,9 +777,8 @@ TEST_F(UnderstandSystem, MapsThatKeysSpellOutAreMapsOfTheirParameters) {
   const GeoTiffPlace laea = keys(10, true);
   EXPECT_TRUE(laea.warnings.empty());
   const auto expected = understand_system("+proj=laea +lat_0=47 +lon_0=11 +ellps=GRS80 +units=km");
-  const MapPoint at = understand_system(laea.georeference.system.wkt)->map_from_geo({12.0, 48.0});
-  EXPECT_NEAR(at.easting, expected->map_from_geo({12.0, 48.0}).easting, 1e-9);
-  EXPECT_NEAR(at.northing, expected->map_from_geo({12.0, 48.0}).northing, 1e-9);
+  expect_near(understand_system(laea.georeference.system.wkt)->map_from_geo({12.0, 48.0}),
+              expected->map_from_geo({12.0, 48.0}), 1e-9);
   EXPECT_EQ(are_same(laea.georeference.system, keys(10, false).georeference.system), false);
   ASSERT_EQ(keys(99, true).warnings.size(), 1U);
   EXPECT_THAT(keys(99, true).warnings[0].c_str(), HasSubstr("99"));

@@ -8,6 +8,7 @@
 
 #include "formats/georeference/units.h"
 #include "isohf/error.h"
+#include "support/rasters/place_at.h"
 
 namespace isohf {
 namespace {
@@ -74,9 +75,7 @@ TEST(GeoTiffPlace, TransformationEqualsScaleAndTiePoint) {
     tags.tiepoints.clear();
     tags.transformation = {10, 0, 0, 1000, 0, -20, 0, 2000, 0, 0, 0, 0, 0, 0, 0, 1};
     const Georeference by_matrix = place_from_geotiff(tags, 100).georeference;
-    EXPECT_EQ(by_scale.origin_x, by_matrix.origin_x);
-    EXPECT_EQ(by_scale.origin_y, by_matrix.origin_y);
-    EXPECT_EQ(by_scale.spacing_y, by_matrix.spacing_y);
+    EXPECT_EQ(test::grid_of(by_scale), test::grid_of(by_matrix));
   }
 }
 

@@ -1,6 +1,7 @@
 #include "formats/readers.h"
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -11,6 +12,7 @@
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/error_of.h"
+#include "support/rasters/place_at.h"
 #include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
@@ -88,10 +90,7 @@ TEST_F(TiffSource, TurnsAGeoreferenceThatRunsFromTheSouth) {
   TiffBytes tiff = small().doubles(34264, {10, 0, 0, 500, 0, 20, 0, 7000, 0, 0, 0, 0, 0, 0, 0, 1});
   EXPECT_EQ(values(tiff), (Values{4, 5, 2, 3, 0, 1}));
   const Georeference geo = info_of(tiff).georeference;
-  EXPECT_EQ(geo.spacing_x, 10);
-  EXPECT_EQ(geo.spacing_y, 20);
-  EXPECT_EQ(geo.origin_x, 505);
-  EXPECT_EQ(geo.origin_y, 7050);
+  EXPECT_THAT(test::grid_of(geo), ::testing::ElementsAre(505, 7050, 10, 20));
 }
 
 TEST_F(TiffSource, IgnoresTheOrientationOfAGeoreferencedImage) {
@@ -116,10 +115,7 @@ TEST_F(TiffSource, PlacesBySidecarFilesWhereTheTagsDoNot) {
                    "PROJCS[\"somewhere\",GEOGCS[\"S\",DATUM[\"S\",SPHEROID[\"S\",6378137,298]],"
                    "PRIMEM[\"Greenwich\",0],UNIT[\"Degree\",0.0174532925199433]],UNIT[\"Foot\",0.3048]]\n");
   SourceInfo info = info_of(small());
-  EXPECT_EQ(info.georeference.spacing_x, 30);
-  EXPECT_EQ(info.georeference.spacing_y, 20);
-  EXPECT_EQ(info.georeference.origin_x, 1000.5);
-  EXPECT_EQ(info.georeference.origin_y, 2000.5);
+  EXPECT_THAT(test::grid_of(info.georeference), ::testing::ElementsAre(1000.5, 2000.5, 30, 20));
   EXPECT_EQ(info.georeference.system.name, "somewhere");
   EXPECT_EQ(info.georeference.system.wkt.rfind("PROJCS[\"somewhere\"", 0), 0U);
   EXPECT_EQ(info.georeference.unit, HorizontalUnit::kMetre);

@@ -10,6 +10,7 @@
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/rasters/every_window.h"
+#include "support/rasters/place_at.h"
 #include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
@@ -55,9 +56,7 @@ TEST_F(AsciiGrid, ReadsWholeNumbersAsIntegers) {
   const Georeference& place = info.georeference;
   EXPECT_EQ(place.registration, Registration::kArea);
   EXPECT_EQ(place.unit, HorizontalUnit::kUnknown);
-  EXPECT_TRUE(place.has_origin);
-  EXPECT_EQ(place.origin_x, 105.0);
-  EXPECT_EQ(place.origin_y, 215.0);
+  EXPECT_THAT(origin_of(place), ElementsAre(105.0, 215.0));
 }
 
 TEST_F(AsciiGrid, ChoosesTheSampleTypeThatHoldsEveryNumber) {
@@ -80,8 +79,7 @@ TEST_F(AsciiGrid, TakesTheHeaderInAnyOrderAndCase) {
       "nodata_VALUE -1.5\r\nCELLSIZE 2.5\r\nYLLCENTER -4\r\nXllCenter -3\r\nNROWS 2\r\nNCOLS 3\r\n1 2 3\r\n4 5 "
       "6.5\r\n");
   const SourceInfo& info = source->info();
-  EXPECT_EQ(info.georeference.origin_x, -3.0);
-  EXPECT_EQ(info.georeference.origin_y, -1.5);
+  EXPECT_THAT(origin_of(info.georeference), ElementsAre(-3.0, -1.5));
   EXPECT_EQ(info.georeference.spacing_x, 2.5);
   EXPECT_EQ(info.georeference.registration, Registration::kArea);
   EXPECT_THAT(info.void_values, ElementsAre(-1.5));
@@ -104,10 +102,7 @@ TEST_F(AsciiGrid, TakesTheVoidValueInAnySpelling) {
 
 TEST_F(AsciiGrid, TellsTheSpacingsOfBothAxes) {
   const auto source = open("ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ndx 10\ndy 20\n1 2 3 4 5 6\n");
-  EXPECT_EQ(source->info().georeference.spacing_x, 10.0);
-  EXPECT_EQ(source->info().georeference.spacing_y, 20.0);
-  EXPECT_EQ(source->info().georeference.origin_x, 5.0);
-  EXPECT_EQ(source->info().georeference.origin_y, 30.0);
+  EXPECT_THAT(grid_of(source->info().georeference), ElementsAre(5.0, 30.0, 10.0, 20.0));
 }
 
 TEST_F(AsciiGrid, BreaksLinesAnywhere) {

@@ -12,6 +12,7 @@
 #include "formats/reader_failure.h"
 #include "formats/registry.h"
 #include "isohf/raster.h"
+#include "support/rasters/place_at.h"
 #include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
@@ -52,7 +53,8 @@ class Described : public ::testing::Test {
   [[nodiscard]] std::unique_ptr<HeightSource> open_z(NetcdfBytes& file, const std::string& shorts,
                                                      const NetcdfBytes::Texts& texts = {},
                                                      const NetcdfBytes::Numbers& numbers = {}) const {
-    return open_z(file, shorts, texts, numbers);
+    write("a.nc", file.variable("z", {0, 1}, 3, shorts, texts, numbers).bytes());
+    return open("a.nc");
   }
 
   TemporaryFolder folder_;
@@ -172,8 +174,7 @@ TEST_F(Netcdf, LongitudesMayComeBeforeLatitudes) {
   ASSERT_EQ(source->info().height, 2);
   EXPECT_THAT(values_of(*source), ElementsAre(2, 4, 6, 1, 3, 5));  // the South comes first
   const Georeference& place = source->info().georeference;
-  EXPECT_EQ(place.origin_x, 10.0);
-  EXPECT_EQ(place.origin_y, 40.5);
+  EXPECT_THAT(origin_of(place), ElementsAre(10.0, 40.5));
   EXPECT_THAT(values_of(source->info().sample_type, read_window(*source, {1, 1, 2, 1})), ElementsAre(3, 5));
 }
 
@@ -361,6 +362,15 @@ class Netcdf4 : public ::testing::Test {
  protected:
   void SetUp() override { set_module_folder(ISOHF_BIN_DIR); }
   static std::string file(const char* name) { return std::string(ISOHF_SOURCE_DIR) + "/tests/formats/data/" + name; }
+  /// Their 9 x 7 samples, which rise by 7 from -100 in the South-West corner, times `factor`; one is void.
+  static std::vector<double> stored_from_south(double void_value, double factor) {
+    std::vector<double> values;
+    for (int row = 6; row >= 0; --row) {
+      for (int column = 0; column < 9; ++column)
+        values.push_back(row == 3 && column == 4 ? void_value : ((row * 9 + column) * 7 - 100) * factor);
+    }
+    return values;
+  }
 };
 
 TEST_F(Netcdf4, RowsFromTheSouthAreTurned) {
@@ -377,13 +387,7 @@ TEST_F(Netcdf4, RowsFromTheSouthAreTurned) {
   EXPECT_DOUBLE_EQ(info.georeference.origin_x, 6.0);
   EXPECT_DOUBLE_EQ(info.georeference.origin_y, 45.025);
   const std::vector<double> values = values_of(*source);
-  for (int row = 0; row < 7; ++row) {
-    for (int column = 0; column < 9; ++column) {
-      const int stored_row = 6 - row;
-      const double expected = stored_row == 3 && column == 4 ? -32767 : (stored_row * 9 + column) * 7 - 100;
-      EXPECT_EQ(values[static_cast<std::size_t>(row * 9 + column)], expected) << column << ' ' << row;
-    }
-  }
+  EXPECT_EQ(values, stored_from_south(-32767, 1.0));
   for (const std::uint64_t limit : {std::uint64_t{0}, std::uint64_t{1000}}) {
     source->limit_buffers(limit);
     EXPECT_EQ(values_of(*source), values);
@@ -417,14 +421,7 @@ TEST_F(Netcdf4, LongitudesMayComeBeforeLatitudes) {
   // float32 coordinates: a hundredth of a sample
   EXPECT_NEAR(info.georeference.origin_x, 6.0, 4e-5);
   EXPECT_NEAR(info.georeference.origin_y, 45.025, 4e-5);
-  const std::vector<double> values = values_of(*source);
-  for (int row = 0; row < 7; ++row) {
-    for (int column = 0; column < 9; ++column) {
-      const int stored_row = 6 - row;
-      const double expected = stored_row == 3 && column == 4 ? -16383.5 : ((stored_row * 9 + column) * 7 - 100) * 0.5;
-      EXPECT_EQ(values[static_cast<std::size_t>(row * 9 + column)], expected) << column << ' ' << row;
-    }
-  }
+  EXPECT_EQ(values_of(*source), stored_from_south(-16383.5, 0.5));
 }
 #endif
 
@@ -554,8 +551,7 @@ TEST_F(Pds4, ReadsTheArrayThatTheLabelDescribes) {
     EXPECT_EQ(place.registration, Registration::kArea);
     EXPECT_EQ(place.unit, HorizontalUnit::kMetre);
     EXPECT_EQ(place.spacing_x, 100.0);
-    EXPECT_EQ(place.origin_x, 5050.0);
-    EXPECT_EQ(place.origin_y, 8950.0);
+    EXPECT_THAT(origin_of(place), ElementsAre(5050.0, 8950.0));
     EXPECT_EQ(place.system.body, "Mars");
     EXPECT_THAT(place.system.wkt, HasSubstr(R"(PARAMETER["standard_parallel_1",30])"));
     EXPECT_THAT(place.system.wkt, HasSubstr(R"(PARAMETER["central_meridian",-20])"));

@@ -7,6 +7,7 @@
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/rasters/every_window.h"
+#include "support/rasters/place_at.h"
 #include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
@@ -74,11 +75,7 @@ TEST_F(HeaderGrid, TakesThePlaceFromAWorldFileWhereTheHeaderHasNone) {
     write(extension, world);
     const auto source = open(kSixteenBits, bytes(12), data);
     const Georeference& place = source->info().georeference;
-    EXPECT_TRUE(place.has_origin);
-    EXPECT_EQ(place.origin_x, 500005.0);
-    EXPECT_EQ(place.origin_y, 4000010.0);
-    EXPECT_EQ(place.spacing_x, 10.0);
-    EXPECT_EQ(place.spacing_y, 20.0);
+    EXPECT_THAT(grid_of(place), ElementsAre(500005.0, 4000010.0, 10.0, 20.0));
     EXPECT_THAT(source->info().warnings, IsEmpty());
     // The header goes first, and what contradicts it is said.
     const std::string placed = std::string(kSixteenBits) + "ULXMAP 500005\nULYMAP 4000010\nXDIM 10\nYDIM ";

@@ -15,6 +15,7 @@
 namespace isohf {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 std::string array(const std::string& descr, const std::string& shape, const std::string& data, int version = 1,
@@ -90,21 +91,19 @@ TEST_F(Npy, ReadsWholeNumbersOf64BitsAsFloatsThatHoldThem) {
       SCOPED_TRACE(fmt::format("{} {}", type, order));
       const auto source = open_raster(write(array(type, "(2, 3)", counting(8, type[0] == '>'), 1, order)), {});
       ASSERT_EQ(source->info().sample_type, SampleType::kFloat64);
-      std::vector<std::byte> last(16);
-      source->read_window({2, 0, 1, 2}, last);
-      EXPECT_EQ(test::value_at(SampleType::kFloat64, last, 0), order[0] == 'F' ? 3.0 : 5.0);
-      EXPECT_EQ(test::value_at(SampleType::kFloat64, last, 1), 6.0);
+      EXPECT_THAT(test::values_of(SampleType::kFloat64, test::read_window(*source, {2, 0, 1, 2})),
+                  ElementsAre(order[0] == 'F' ? 3.0 : 5.0, 6.0));
     }
   }
   const auto number = [&](const char* type, const std::string& bytes) { return array(type, "(1, 1)", bytes); };
+  const auto value = [&](const char* type, const std::string& bytes) {
+    return test::values_of(*open_raster(write(number(type, bytes)), {})).at(0);
+  };
   const std::string lowest("\0\0\0\0\0\0\0\x80", 8);
-  EXPECT_EQ(test::value_at(SampleType::kFloat64, test::read_whole(*open_raster(write(number("<i8", lowest)), {})), 0),
-            -0x1p63);
-  EXPECT_EQ(test::value_at(SampleType::kFloat64, test::read_whole(*open_raster(write(number("<u8", lowest)), {})), 0),
-            0x1p63);
+  EXPECT_EQ(value("<i8", lowest), -0x1p63);
+  EXPECT_EQ(value("<u8", lowest), 0x1p63);
   const std::string ones(8, '\xff');
-  EXPECT_EQ(test::value_at(SampleType::kFloat64, test::read_whole(*open_raster(write(number("<i8", ones)), {})), 0),
-            -1);
+  EXPECT_EQ(value("<i8", ones), -1);
   EXPECT_THAT(
       failure(number("<u8", ones)),
       HasSubstr("sample (0, 0) is 18446744073709551615, which float64 does not hold; store the samples as float64"));
@@ -137,13 +136,8 @@ TEST_F(Npy, ReadsFortranOrder) {
   for (const bool big_endian : {false, true}) {
     const std::string type = big_endian ? ">i2" : "<i2";
     const auto source = open_raster(write(array(type, "(2, 3)", counting(2, big_endian), 1, "True")), {});
-    const auto raw = test::read_whole(*source);
-    const std::vector<double> wanted = {1, 3, 5, 2, 4, 6};
-    for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(test::value_at(SampleType::kInt16, raw, i), wanted[i]);
-    std::vector<std::byte> part(4);
-    source->read_window({1, 1, 2, 1}, part);
-    EXPECT_EQ(test::value_at(SampleType::kInt16, part, 0), 4.0);
-    EXPECT_EQ(test::value_at(SampleType::kInt16, part, 1), 6.0);
+    EXPECT_THAT(test::values_of(*source), ElementsAre(1, 3, 5, 2, 4, 6));
+    EXPECT_THAT(test::values_of(SampleType::kInt16, test::read_window(*source, {1, 1, 2, 1})), ElementsAre(4, 6));
   }
 }
 
@@ -161,14 +155,12 @@ TEST_F(Npy, PicksAnArrayOfAnArchive) {
     const auto first = open_raster(path, {});
     EXPECT_EQ(first->info().width, 3);
     EXPECT_EQ(first->info().channel, "low");
-    EXPECT_THAT(first->info().warnings, ::testing::ElementsAre(HasSubstr("array low is read, of dx, low, high")));
+    EXPECT_THAT(first->info().warnings, ElementsAre(HasSubstr("array low is read, of dx, low, high")));
     OpenOptions options = test::of_channel("high");
     const auto high = open_raster(path, options);
     EXPECT_EQ(high->info().width, 2);
     EXPECT_TRUE(high->info().warnings.empty());
-    const auto raw = test::read_whole(*high);
-    for (std::size_t i = 0; i < 6; ++i)
-      EXPECT_EQ(test::value_at(SampleType::kInt32, raw, i), static_cast<double>(i + 1));
+    EXPECT_THAT(test::values_of(*high), ElementsAre(1, 2, 3, 4, 5, 6));
     const auto says = [&](const char* channel) {
       options.channel = channel;
       ErrorCode code = ErrorCode::kCancelled;

@@ -7,6 +7,7 @@
 
 #include "formats/reader_failure.h"
 #include "isohf/raster.h"
+#include "support/rasters/place_at.h"
 #include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
@@ -43,10 +44,7 @@ TEST_F(Xyz, PointsMayComeInAnyOrder) {
     const SourceInfo& info = source->info();
     EXPECT_EQ(info.sample_type, SampleType::kInt32);
     EXPECT_THAT(values_of(*source), ElementsAre(20, 21, 22, 23, 10, 11, 12, 13, 0, 1, 2, 3));
-    EXPECT_EQ(info.georeference.origin_x, 500.5);
-    EXPECT_EQ(info.georeference.origin_y, 4005.0);
-    EXPECT_EQ(info.georeference.spacing_x, 2.0);
-    EXPECT_EQ(info.georeference.spacing_y, 2.5);
+    EXPECT_THAT(grid_of(info.georeference), ElementsAre(500.5, 4005.0, 2.0, 2.5));
     EXPECT_EQ(info.georeference.registration, Registration::kPoint);
     EXPECT_THAT(values_of(info.sample_type, read_window(*source, {1, 1, 2, 2})), ElementsAre(11, 12, 1, 2));
   };

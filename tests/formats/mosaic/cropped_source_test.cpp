@@ -78,9 +78,7 @@ TEST(CroppedSource, ABoxAcrossTheSeamOfAGlobeIsJoined) {
       std::memcpy(samples.data() + 2 * i, &z, 2);
     }
     const TemporaryFolder folder;
-    const auto sink = create_raster(folder / "globe.tif", spec);
-    sink->write_rows(samples);
-    sink->finish();
+    write_raster(folder / "globe.tif", spec, samples);
     const auto joined = [&](const std::string& box) {
       return crop(open_raster(folder / "globe.tif", {}), bounding_box_from_string(box));
     };

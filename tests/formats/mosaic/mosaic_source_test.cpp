@@ -68,9 +68,7 @@ TEST_F(MosaicSource, PiecesGiveTheWholeBitForBitInEveryType) {
       EXPECT_EQ(info.width, 97);
       EXPECT_EQ(info.height, 61);
       EXPECT_EQ(info.sample_type, type);
-      EXPECT_EQ(info.georeference.origin_x, original.georeference.origin_x);
-      EXPECT_EQ(info.georeference.origin_y, original.georeference.origin_y);
-      EXPECT_EQ(info.georeference.spacing_x, original.georeference.spacing_x);
+      EXPECT_EQ(grid_of(info.georeference), grid_of(original.georeference));
       EXPECT_EQ(info.georeference.registration, registration);
       EXPECT_EQ(info.georeference.system.epsg, 32632);
       EXPECT_EQ(info.format, original.format);

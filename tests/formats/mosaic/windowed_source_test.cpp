@@ -111,8 +111,7 @@ TEST(Decorators, HaveTheSamplesAsStoredBehindEveryWindow) {
   ASSERT_NE(&stored, &source);
   EXPECT_EQ(stored.info().width, 56);
   EXPECT_EQ(stored.info().height, 20);
-  EXPECT_EQ(stored.info().georeference.origin_x, source.info().georeference.origin_x);
-  EXPECT_EQ(stored.info().georeference.origin_y, source.info().georeference.origin_y);
+  EXPECT_EQ(grid_of(stored.info().georeference), grid_of(source.info().georeference));
   const std::vector<std::int16_t> as_stored = read(stored, {0, 0, 56, 20});
   EXPECT_EQ(as_stored, read(whole, {16, 8, 56, 20}));
   const std::vector<std::int16_t> as_filled = read(source, {0, 0, 56, 20});

@@ -91,11 +91,9 @@ TEST_F(Pds3, ReadsTheRealMoonBehindItsLabelNotInside) {
   ASSERT_EQ(info.warnings.size(), 1U);
   EXPECT_THAT(info.warnings.front(),
               HasSubstr("^IMAGE points at byte 2904, inside the label, which ends at byte 2924"));
-  const auto raw = test::read_whole(*source);
-  EXPECT_EQ(test::value_at(SampleType::kInt16, raw, 0), -10);
-  for (std::size_t i = 0; i < 1440; ++i) {
-    EXPECT_LT(std::abs(test::value_at(SampleType::kInt16, raw, i)), 2000) << i;
-  }
+  const std::vector<double> values = test::values_of(*source);
+  EXPECT_EQ(values[0], -10);
+  for (const double value : values) EXPECT_LT(std::abs(value), 2000);
 }
 
 TEST_F(Pds3, ReadsEverySampleType) {
@@ -134,11 +132,11 @@ TEST_F(Pds3, ReadsEverySampleType) {
       for (int b = 0; b < 4; ++b) data.push_back(static_cast<char>(bits >> (8 * (big_endian ? 3 - b : b))));
     }
     const auto source = open_raster(write("f.img", attached(image) + data + std::string(36, '\0')), {});
-    const auto raw = test::read_whole(*source);
+    const std::vector<double> values = test::values_of(*source);
     ASSERT_EQ(source->info().sample_type, SampleType::kFloat32);
-    EXPECT_EQ(test::value_at(SampleType::kFloat32, raw, 0), 1.5);
-    EXPECT_TRUE(test::is_void(source->info(), test::value_at(SampleType::kFloat32, raw, 1)));
-    EXPECT_FALSE(test::is_void(source->info(), test::value_at(SampleType::kFloat32, raw, 2)));
+    EXPECT_EQ(values[0], 1.5);
+    EXPECT_TRUE(test::is_void(source->info(), values[1]));
+    EXPECT_FALSE(test::is_void(source->info(), values[2]));
     ASSERT_EQ(source->info().void_values.size(), 1U);
   }
 }
@@ -159,10 +157,7 @@ TEST_F(Pds3, ReadsVaxFloats) {
       replaced(replaced(kImage, "MSB_INTEGER", "VAX_REAL"), "SAMPLE_BITS = 16", "SAMPLE_BITS = 32");
   const auto source = open_pds3(write("vax.img", attached(image) + data), {});
   ASSERT_EQ(source->info().sample_type, SampleType::kFloat32);
-  const auto raw = test::read_whole(*source);
-  for (std::size_t i = 0; i < 12; ++i) {
-    EXPECT_EQ(test::value_at(SampleType::kFloat32, raw, i), wanted[i]) << i;
-  }
+  EXPECT_EQ(test::values_of(*source), wanted);
 }
 
 TEST_F(Pds3, WindowsEqualTheWholeInEveryLayout) {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cmath>
 #include <optional>
+#include <vector>
 
 #include "isohf/raster.h"
 
@@ -18,6 +20,19 @@ inline Georeference place_at(Registration registration, HorizontalUnit unit, dou
   place.origin_y = y;
   place.system.epsg = epsg;
   return place;
+}
+
+/// x and y of the first sample; NaN where they are not known.
+inline std::vector<double> origin_of(const Georeference& place) {
+  if (!place.has_origin) return {std::nan(""), std::nan("")};
+  return {place.origin_x, place.origin_y};
+}
+
+/// The same, and the spacings along x and y.
+inline std::vector<double> grid_of(const Georeference& place) {
+  std::vector<double> grid = origin_of(place);
+  grid.insert(grid.end(), {place.spacing_x, place.spacing_y});
+  return grid;
 }
 
 }  // namespace isohf::test
