@@ -9,6 +9,7 @@
 
 #include "isohf/error.h"
 #include "support/error_of.h"
+#include "support/in_folder.h"
 #include "support/rasters/samples.h"
 
 namespace isohf::test {
@@ -33,5 +34,22 @@ std::string failure_of(const std::string& path, ErrorCode* code, const Use& use)
     return message.empty() ? "?" : message;
   }
 }
+
+/// Files of a reader, in a folder of their own.
+class ReaderTest : public InFolder {
+ protected:
+  /// Its path.
+  template <typename Bytes>
+  std::string write(const std::string& name, const Bytes& bytes) const {
+    write_file(folder / name, bytes);
+    return folder / name;
+  }
+
+  /// What `open` or reading the first samples says; empty where it works.
+  template <typename Open>
+  static std::string failure_at(const std::string& path, ErrorCode* code, const Open& open) {
+    return failure_of(path, code, [&] { read_corner(*open(path, OpenOptions{})); });
+  }
+};
 
 }  // namespace isohf::test

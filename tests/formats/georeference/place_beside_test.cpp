@@ -21,30 +21,24 @@ constexpr const char* kDegrees =
     R"(GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["Degree",0.0174532925199433]])";
 
 /// Pictures that say nothing of their place, and what lies beside them.
-class PlaceBeside : public ::testing::Test {
+class PlaceBeside : public ReaderTest {
  protected:
   PlaceBeside() { set_module_folder(ISOHF_BIN_DIR); }
 
   /// A graymap, which OpenImageIO reads.
-  std::string graymap(const std::string& name) {
-    write_file(folder_ / name, "P2\n4 2\n255\n1 2 3 4 5 6 7 8\n");
-    return folder_ / name;
-  }
-  void beside(const std::string& name, const std::string& text) { write_file(folder_ / name, text); }
-
-  TemporaryFolder folder_;
+  std::string graymap(const std::string& name) { return write(name, "P2\n4 2\n255\n1 2 3 4 5 6 7 8\n"); }
 };
 
 TEST_F(PlaceBeside, WorldFileAndPrjPlaceAPicture) {
-  beside("a.prj", kDegrees);
+  write("a.prj", kDegrees);
   const std::string data = std::string(ISOHF_SOURCE_DIR) + "/testdata/";
-  std::filesystem::copy_file(data + "peaks_256x256_uint16.png", folder_ / "a.png");
+  std::filesystem::copy_file(data + "peaks_256x256_uint16.png", folder / "a.png");
   (void)graymap("a.pgm");
   // Read by libpng and OpenImageIO; OpenEXR has its threads and a test of its own (ExrSource).
   for (const auto& [picture, world] : {std::pair("a.png", "a.pgw"), {"a.pgm", "a.pmw"}}) {
     SCOPED_TRACE(picture);
-    beside(world, "0.5\n0\n0\n-0.25\n10.25\n50\n");
-    const Georeference place = open_raster(folder_ / picture, {})->info().georeference;
+    write(world, "0.5\n0\n0\n-0.25\n10.25\n50\n");
+    const Georeference place = open_raster(folder / picture, {})->info().georeference;
     EXPECT_THAT(grid_of(place), ::testing::ElementsAre(10.25, 50.0, 0.5, 0.25));
     EXPECT_EQ(place.unit, HorizontalUnit::kDegree);
     EXPECT_EQ(place.system.name, "GCS_WGS_1984");
@@ -53,28 +47,28 @@ TEST_F(PlaceBeside, WorldFileAndPrjPlaceAPicture) {
 }
 
 TEST_F(PlaceBeside, PictureWithoutAWorldFileHasNoPlace) {
-  beside("a.prj", kDegrees);
+  write("a.prj", kDegrees);
   const Georeference place = open_raster(graymap("a.pgm"), {})->info().georeference;
   EXPECT_FALSE(place.has_origin);
   EXPECT_EQ(place.unit, HorizontalUnit::kUnknown);
 }
 
 TEST_F(PlaceBeside, RefusesPicturesWithNorthAtTheBottom) {
-  beside("a.wld", "0.5\n0\n0\n0.25\n10.25\n50\n");
+  write("a.wld", "0.5\n0\n0\n0.25\n10.25\n50\n");
   const std::string path = graymap("a.pgm");
   const Error error = error_of([&] { (void)open_raster(path, {}); });
   EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
-  EXPECT_EQ(error.what(), folder_ / "a.wld" + ": dy is positive; rows must run from North to South");
+  EXPECT_EQ(error.what(), folder / "a.wld" + ": dy is positive; rows must run from North to South");
 }
 
 TEST_F(PlaceBeside, SaysWhichWorldFileIsNone) {
-  beside("a.wld", "half a metre");
+  write("a.wld", "half a metre");
   const std::string path = graymap("a.pgm");
   EXPECT_THAT(error_of([&] { (void)open_raster(path, {}); }).what(), HasSubstr("a.wld: is not a world file"));
 }
 
 TEST_F(PlaceBeside, WarnsOfDegreesThatNothingNames) {
-  beside("a.wld", "0.001\n0\n0\n-0.001\n10.25\n50\n");
+  write("a.wld", "0.001\n0\n0\n-0.001\n10.25\n50\n");
   const auto source = open_raster(graymap("a.pgm"), {});
   ASSERT_EQ(source->info().warnings.size(), 1U);
   EXPECT_THAT(source->info().warnings[0], HasSubstr("look like degrees"));

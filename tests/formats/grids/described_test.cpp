@@ -39,14 +39,13 @@ std::string vrt_source(const std::string& file, const std::string& more = {}, co
       more);
 }
 
-class Described : public ::testing::Test {
+class Described : public ReaderTest {
  protected:
-  void write(const std::string& name, const std::string& bytes) const { write_file(folder_ / name, bytes); }
   [[nodiscard]] std::unique_ptr<HeightSource> open(const std::string& name, const std::string& channel = {}) const {
-    return open_raster(folder_ / name, of_channel(channel));
+    return open_raster(folder / name, of_channel(channel));
   }
   [[nodiscard]] std::string failure(const std::string& name, ErrorCode* code = nullptr) const {
-    return failure_of(folder_.path(), code, [&] { read_corner(*open(name)); });
+    return failure_of(folder.path(), code, [&] { read_corner(*open(name)); });
   }
 
   /// Opens the file with a variable z of shorts over both dimensions.
@@ -56,8 +55,6 @@ class Described : public ::testing::Test {
     write("a.nc", file.variable("z", {0, 1}, 3, shorts, texts, numbers).bytes());
     return open("a.nc");
   }
-
-  TemporaryFolder folder_;
 };
 
 using Envi = Described;
@@ -117,7 +114,7 @@ TEST_F(Envi, GainsAndOffsetsAreTheBandsOwn) {
   EXPECT_EQ(second->info().channel, "slope");
   EXPECT_EQ(open("a.dat", "1")->info().z_scale, 0.5);
   EXPECT_THAT(open("a.dat")->info().warnings.front(), HasSubstr("channel height is read"));
-  EXPECT_THAT(failure_of(folder_.path(), nullptr, [&] { (void)open("a.dat", "aspect"); }),
+  EXPECT_THAT(failure_of(folder.path(), nullptr, [&] { (void)open("a.dat", "aspect"); }),
               HasSubstr("are 0 to 1: height, slope"));
   write("a.hdr", envi("data gain values = {0, 1}\n"));
   EXPECT_THAT(failure("a.dat"), HasSubstr("data gain values gives a scale of 0"));
@@ -184,8 +181,7 @@ TEST_F(Netcdf, GmtGridsFromBeforeCfAreRefusedWithTheCommandThatConvertsThem) {
   file.variable("x_range", {0}, 6, big_endian<double>({0.0, 2.0}), {});
   file.variable("dimension", {0}, 4, big_endian<std::int32_t>({3, 2}), {});
   write("a.grd", file.variable("z", {1}, 5, std::string(24, '\1'), {}).bytes());
-  EXPECT_THAT(failure("a.grd"),
-              HasSubstr("a GMT grid from before CF; gmt grdconvert " + folder_ / "a.grd" + " OUT.nc"));
+  EXPECT_THAT(failure("a.grd"), HasSubstr("a GMT grid from before CF; gmt grdconvert " + folder / "a.grd" + " OUT.nc"));
 }
 
 TEST_F(Netcdf, CoordinatesOfFloat32MayBeRounded) {
@@ -337,7 +333,7 @@ TEST_F(Netcdf, UnitsOfCoordinatesAreReadOrTold) {
   set_module_folder(ISOHF_BIN_DIR);
   OpenOptions options;
   options.reference_system = "EPSG:2263";
-  EXPECT_THAT(open_raster(folder_ / "a.nc", options)->info().warnings, ::testing::Not(Contains(HasSubstr("furlong"))));
+  EXPECT_THAT(open_raster(folder / "a.nc", options)->info().warnings, ::testing::Not(Contains(HasSubstr("furlong"))));
 #endif
   EXPECT_THAT(with("x", "radian")->info().warnings, ElementsAre(HasSubstr("\"radian\"")));  // of a view from space
   const auto radians = with("longitude", "radian");
@@ -463,7 +459,7 @@ TEST_F(Vrt, WhatGdalbuildvrtDoesNotWriteIsRefusedWithACommand) {
     write("a.vrt", vrt_of("2x2", type, vrt_source(file, more, "ComplexSource")));
     return failure("a.vrt");
   };
-  const std::string command = "; gdal_translate " + folder_ / "a.vrt" + " OUT.tif makes a GeoTIFF of it";
+  const std::string command = "; gdal_translate " + folder / "a.vrt" + " OUT.tif makes a GeoTIFF of it";
   EXPECT_EQ(vrt("Float32", R"(<SourceProperties DataType="Float32"/>)"), "");
   EXPECT_THAT(vrt("Int16", R"(<SourceProperties DataType="Float32"/>)"), HasSubstr("a.dat are Float32" + command));
   EXPECT_THAT(vrt("Int16", ""), HasSubstr("a.dat is 2.5" + command));

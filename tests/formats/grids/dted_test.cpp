@@ -29,24 +29,13 @@ std::string cell() {
   return test::dted_cell(4, 5, height_at);
 }
 
-class Dted : public testing::Test {
+class Dted : public test::ReaderTest {
  protected:
-  std::string write(const std::string& bytes) const {
-    const std::string path = folder_ / "n43.dt0";
-    test::write_file(path, bytes);
-    return path;
-  }
+  std::string write(const std::string& bytes) const { return ReaderTest::write("n43.dt0", bytes); }
 
-  /// What opening and reading all of it says; empty where it works.
   std::string failure(const std::string& bytes, ErrorCode* code = nullptr) const {
-    const std::string path = write(bytes);
-    return test::failure_of(path, code, [&] {
-      const auto source = open_dted(path, {});
-      (void)test::read_whole(*source);
-    });
+    return failure_at(write(bytes), code, open_dted);
   }
-
-  const test::TemporaryFolder folder_;
 };
 
 TEST_F(Dted, TurnsColumnsIntoRowsFromTheNorth) {

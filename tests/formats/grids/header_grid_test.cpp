@@ -20,15 +20,13 @@ using ::testing::IsEmpty;
 
 constexpr const char* kSixteenBits = "NROWS 2\nNCOLS 3\nNBITS 16\nPIXELTYPE SIGNEDINT\nBYTEORDER I\n";
 
-class HeaderGrid : public ::testing::Test {
+class HeaderGrid : public ReaderTest {
  protected:
-  void write(const std::string& name, const std::string& text) const { write_file(folder_ / name, text); }
-
   [[nodiscard]] std::unique_ptr<HeightSource> open(const std::string& header, const std::string& data,
                                                    const std::string& name = "grid.bil") const {
     write("grid.hdr", header);
     write(name, data);
-    return open_raster(folder_ / name, {});
+    return open_raster(folder / name, {});
   }
 
   [[nodiscard]] std::string refusal(const std::string& header, const std::string& data,
@@ -44,8 +42,6 @@ class HeaderGrid : public ::testing::Test {
     for (std::size_t i = 0; i < count; ++i) data[i] = static_cast<char>((i * 59 + 3) & 0xbfU);
     return data;
   }
-
-  TemporaryFolder folder_;
 };
 
 TEST_F(HeaderGrid, ReadsGtopo30) {
@@ -57,7 +53,7 @@ TEST_F(HeaderGrid, ReadsGtopo30) {
         "YDIM          0.00833333333333\n");
   write("W180N90.DEM", std::string("\xD8\xF1\x00\x01\x00\x02\x01\x00\xFF\xFF\x22\x78", 12));
   for (const char* name : {"W180N90.DEM", "W180N90.HDR"}) {
-    const auto source = open_raster(folder_ / name, {});
+    const auto source = open_raster(folder / name, {});
     const SourceInfo& info = source->info();
     ASSERT_EQ(info.sample_type, SampleType::kInt16);
     EXPECT_EQ(info.void_values, std::vector<double>{-9999.0});
@@ -84,8 +80,8 @@ TEST_F(HeaderGrid, TakesThePlaceFromAWorldFileWhereTheHeaderHasNone) {
                 ElementsAre(HasSubstr("elsewhere than the header")));
     write(extension, "10\n0\n0\n20\n500005\n4000010\n");
     EXPECT_THAT(refusal(kSixteenBits, bytes(12), data), HasSubstr("dy is positive"));
-    std::filesystem::remove(folder_ / extension);
-    std::filesystem::remove(folder_ / data);
+    std::filesystem::remove(folder / extension);
+    std::filesystem::remove(folder / data);
   }
 }
 
@@ -120,7 +116,7 @@ TEST_F(HeaderGrid, ReadsEveryTypeInBothByteOrdersAndEveryLayout) {
         expect_every_window(*source, std::as_bytes(std::span(wanted)));
       }
     }
-    std::filesystem::remove(folder_ / "grid.bil");
+    std::filesystem::remove(folder / "grid.bil");
   }
 }
 
@@ -155,19 +151,19 @@ TEST_F(HeaderGrid, SaysWhatItTakesForGranted) {
 TEST_F(HeaderGrid, MissesTheOtherFileByName) {
   write("lonely.flt", bytes(12));
   write("lonely.bil", bytes(12));
-  EXPECT_THAT(error_of([&] { (void)open_raster(folder_ / "lonely.flt", {}); }).what(),
+  EXPECT_THAT(error_of([&] { (void)open_raster(folder / "lonely.flt", {}); }).what(),
               HasSubstr("lonely.hdr is not there"));
   write("lonely.hdr", kSixteenBits);
-  EXPECT_THAT(error_of([&] { (void)open_raster(folder_ / "lonely.hdr", {}); }).what(), HasSubstr("name the one"));
-  std::filesystem::remove(folder_ / "lonely.flt");
-  EXPECT_EQ(open_raster(folder_ / "lonely.hdr", {})->info().width, 3);
-  std::filesystem::remove(folder_ / "lonely.bil");
-  EXPECT_THAT(error_of([&] { (void)open_raster(folder_ / "lonely.hdr", {}); }).what(),
+  EXPECT_THAT(error_of([&] { (void)open_raster(folder / "lonely.hdr", {}); }).what(), HasSubstr("name the one"));
+  std::filesystem::remove(folder / "lonely.flt");
+  EXPECT_EQ(open_raster(folder / "lonely.hdr", {})->info().width, 3);
+  std::filesystem::remove(folder / "lonely.bil");
+  EXPECT_THAT(error_of([&] { (void)open_raster(folder / "lonely.hdr", {}); }).what(),
               HasSubstr("whose data is not beside"));
   write("twofold.bil", bytes(12));
   write("twofold.bil.hdr", std::string("BYTEORDER I\n") + kSixteenBits);
-  EXPECT_EQ(open_raster(folder_ / "twofold.bil", {})->info().width, 3);
-  EXPECT_EQ(open_raster(folder_ / "twofold.bil.hdr", {})->info().width, 3);
+  EXPECT_EQ(open_raster(folder / "twofold.bil", {})->info().width, 3);
+  EXPECT_EQ(open_raster(folder / "twofold.bil.hdr", {})->info().width, 3);
 }
 
 TEST_F(HeaderGrid, RefusesWhatItDoesNotRead) {

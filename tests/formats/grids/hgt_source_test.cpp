@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "formats/io/zip_archive.h"
+#include "formats/reader_failure.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/error_of.h"
@@ -18,16 +19,7 @@
 namespace isohf {
 namespace {
 
-class HgtSource : public testing::Test {
- protected:
-  std::string write(const std::string& name, const std::vector<std::byte>& bytes) const {
-    const std::string path = folder_ / name;
-    test::write_file(path, bytes);
-    return path;
-  }
-
-  const test::TemporaryFolder folder_;
-};
+class HgtSource : public test::ReaderTest {};
 
 /// A void in front, then rising.
 int sample(int i) {
@@ -177,16 +169,16 @@ TEST_F(HgtSource, IsFoundInAnArchiveOfAnotherName) {
   EXPECT_EQ(source->info().georeference.origin_y, 45.0);
   EXPECT_FALSE(is_zip_of_hgt(write("other.zip", zipped("readme.txt", tile(3, 3), true))));
   EXPECT_FALSE(is_zip_of_hgt(write("none.zip", tile(3, 3))));
-  EXPECT_FALSE(is_zip_of_hgt(folder_ / "absent.zip"));
+  EXPECT_FALSE(is_zip_of_hgt(folder / "absent.zip"));
 }
 
 TEST_F(HgtSource, RefusesWhatIsNoTile) {
-  EXPECT_EQ(code_of(write("N01E001.hgt", {})), ErrorCode::kCorrupt);
+  EXPECT_EQ(code_of(write("N01E001.hgt", "")), ErrorCode::kCorrupt);
   EXPECT_EQ(code_of(write("N01E001.hgt", std::vector<std::byte>(2))), ErrorCode::kCorrupt);
   EXPECT_EQ(code_of(write("N01E001.hgt", std::vector<std::byte>(17))), ErrorCode::kCorrupt);
   EXPECT_EQ(code_of(write("N01E001.hgt", std::vector<std::byte>(2884800))), ErrorCode::kCorrupt);
-  EXPECT_EQ(code_of(folder_ / "N02E002.hgt"), ErrorCode::kIo);
-  EXPECT_EQ(code_of(folder_.path()), ErrorCode::kIo);
+  EXPECT_EQ(code_of(folder / "N02E002.hgt"), ErrorCode::kIo);
+  EXPECT_EQ(code_of(folder.path()), ErrorCode::kIo);
   EXPECT_EQ(code_of(write("N01E001.hgt.zip", zipped("readme.txt", tile(3, 3), true))), ErrorCode::kUnsupported);
   EXPECT_EQ(code_of(write("N01E001.hgt", tile(3, 3)), test::of_channel("R")), ErrorCode::kInvalidArgument);
 }

@@ -40,23 +40,15 @@ std::string counting(int size, bool big_endian) {
   return bytes;
 }
 
-class Npy : public testing::Test {
+class Npy : public test::ReaderTest {
  protected:
   std::string write(const std::string& bytes, const std::string& name = "a.npy") const {
-    const std::string path = folder_ / name;
-    test::write_file(path, bytes);
-    return path;
+    return ReaderTest::write(name, bytes);
   }
 
   std::string failure(const std::string& bytes, ErrorCode* code = nullptr, const std::string& name = "a.npy") const {
-    const std::string path = write(bytes, name);
-    return test::failure_of(path, code, [&] {
-      const auto source = open_raster(path, {});
-      test::read_corner(*source);
-    });
+    return failure_at(write(bytes, name), code, open_raster);
   }
-
-  const test::TemporaryFolder folder_;
 };
 
 TEST_F(Npy, ReadsEveryTypeOrderAndVersion) {

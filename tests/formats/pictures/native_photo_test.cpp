@@ -19,15 +19,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-class NativePhoto : public ::testing::Test {
+class NativePhoto : public ReaderTest {
  protected:
-  std::string write(const std::string& name, const std::string& bytes) {
-    write_file(folder_ / name, bytes);
-    return folder_ / name;
-  }
-  std::string write(const std::string& name, const std::vector<std::byte>& bytes) {
-    return write(name, std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
-  }
   /// Noise as a raster file of bytes.
   std::string write_noise(const std::string& name, int width, int height, int channels) {
     RasterSpec spec;
@@ -41,11 +34,9 @@ class NativePhoto : public ::testing::Test {
         for (int c = 0; c < channels; ++c) samples.push_back(static_cast<std::byte>(noise(column, row, c)));
       }
     }
-    write_raster(folder_ / name, spec, samples);
-    return folder_ / name;
+    write_raster(folder / name, spec, samples);
+    return folder / name;
   }
-
-  const TemporaryFolder folder_;
 };
 
 Picture noise_picture(int width, int height, int channels) {
@@ -76,7 +67,7 @@ std::string counting(int bytes) {
 TEST_F(NativePhoto, ReadsWindowsOfPngAndTiffLargerThanTheCache) {
   for (const char* name : {"p.png", "t.tif"}) {
     for (const int channels : {1, 3, 4}) {
-      std::filesystem::remove(folder_ / name);
+      std::filesystem::remove(folder / name);
       const auto photo = open_photo(write_noise(name, 700, 500, channels));
       ASSERT_EQ(photo->info().width, 700);
       ASSERT_EQ(photo->info().height, 500);
@@ -124,8 +115,8 @@ TEST_F(NativePhoto, RoundsSixteenBitsAndExpandsPalettesOfPng) {
   spec.width = 6;
   spec.height = 1;
   spec.sample_type = SampleType::kUint16;
-  write_raster(folder_ / "deep.png", spec, std::as_bytes(std::span(deep)));
-  EXPECT_EQ(window_of(*open_photo(folder_ / "deep.png"), {0, 0, 6, 1}),
+  write_raster(folder / "deep.png", spec, std::as_bytes(std::span(deep)));
+  EXPECT_EQ(window_of(*open_photo(folder / "deep.png"), {0, 0, 6, 1}),
             (std::vector<std::uint8_t>{0, 255, 100, 100, 101, 1}));
 
   png_image image = {};
@@ -136,7 +127,7 @@ TEST_F(NativePhoto, RoundsSixteenBitsAndExpandsPalettesOfPng) {
   image.colormap_entries = 2;
   const std::array<std::uint8_t, 4> indices = {0, 1, 1, 0};
   const std::array<std::uint8_t, 6> colours = {10, 20, 30, 200, 210, 220};
-  const std::string path = folder_ / "palette.png";
+  const std::string path = folder / "palette.png";
   ASSERT_NE(png_image_write_to_file(&image, path.c_str(), 0, indices.data(), 4, colours.data()), 0);
   const auto photo = open_photo(path);
   EXPECT_EQ(photo->info().channels, 3);

@@ -22,7 +22,7 @@ int ground_at(int column, int row) {
   return column * 1000 + row * 7;
 }
 
-class OiioModule : public ::testing::Test {
+class OiioModule : public ReaderTest {
  protected:
   OiioModule() { set_module_folder(ISOHF_BIN_DIR); }
 
@@ -35,21 +35,15 @@ class OiioModule : public ::testing::Test {
         bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
       }
     }
-    const std::string path = folder_ / "ground.pfm";
-    write_file(path, bytes);
-    return path;
+    return write("ground.pfm", bytes);
   }
 
   /// An 8-bit portable pixmap whose channels differ.
   std::string write_pixmap() {
     std::string bytes = "P6\n4 2\n255\n";
     for (char value = 0; value < 24; ++value) bytes.push_back(value);
-    const std::string path = folder_ / "colours.ppm";
-    write_file(path, bytes);
-    return path;
+    return write("colours.ppm", bytes);
   }
-
-  TemporaryFolder folder_;
 };
 
 TEST_F(OiioModule, ReadsWhatNoNativeReaderKnows) {
@@ -99,8 +93,8 @@ TEST_F(OiioModule, ReadsTheChannelAskedFor) {
 }
 
 TEST_F(OiioModule, UnpacksElevationsOutOfColours) {
-  std::filesystem::create_directories(folder_ / "4/3");
-  const std::string path = folder_ / "4/3/5.ppm";
+  std::filesystem::create_directories(folder / "4/3");
+  const std::string path = folder / "4/3/5.ppm";
   std::string bytes = "P6\n16 16\n255\n";
   for (int at = 0; at < 256; ++at) {
     const int code = 100000 + 37 * at;
@@ -122,8 +116,7 @@ TEST_F(OiioModule, UnpacksElevationsOutOfColours) {
 
 TEST_F(OiioModule, RefusesFilesWhoseNumbersItWouldNotGet) {
   const auto refuses = [&](const std::string& name, const std::string& bytes, const char* why) {
-    const std::string path = folder_ / name;
-    write_file(path, bytes);
+    const std::string path = write(name, bytes);
     const Error error = error_of([&] { (void)open_raster(path, {}); });
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
     EXPECT_EQ(std::string(error.what()).rfind(path + ": " + why, 0), 0U) << error.what();
@@ -159,15 +152,14 @@ TEST_F(OiioModule, AppliesTheOpenOptions) {
 TEST_F(OiioModule, ReportsTruncationAndForeignFilesInOneLine) {
   const std::string whole = write_floatmap();
   const auto bytes = read_file(whole);
-  const std::string cut = folder_ / "cut.pfm";
+  const std::string cut = folder / "cut.pfm";
   for (std::size_t length = 1; length < bytes.size(); length += 13) {
     write_file(cut, bytes.substr(0, length));
     const Error error = error_of([&] { (void)read_whole(*open_raster(cut, {})); });
     EXPECT_THAT(error.what(), HasSubstr(cut));
     EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
   }
-  const std::string text = folder_ / "notes.txt";
-  write_file(text, "this is no raster");
+  const std::string text = write("notes.txt", "this is no raster");
   const Error error = error_of([&] { (void)open_raster(text, {}); });
   EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
   EXPECT_THAT(error.what(), HasSubstr("unknown format: this is text; isohf formats lists what is read"));

@@ -19,15 +19,10 @@ namespace {
 
 using ::testing::HasSubstr;
 
-class Photo : public ::testing::Test {
+class Photo : public ReaderTest {
  protected:
   Photo() { set_module_folder(ISOHF_BIN_DIR); }
 
-  std::string write(const std::string& name, const std::string& bytes) {
-    const std::string path = folder_ / name;
-    write_file(path, bytes);
-    return path;
-  }
   /// A portable pixmap (3), or a graymap in text (1), of noise.
   std::string write_pixmap(const std::string& name, int width, int height, int channels) {
     std::string bytes =
@@ -40,8 +35,6 @@ class Photo : public ::testing::Test {
     }
     return write(name, bytes);
   }
-
-  const TemporaryFolder folder_;
 };
 
 TEST_F(Photo, ReadsWindowsOfAPictureLargerThanTheCache) {
@@ -150,7 +143,7 @@ TEST_F(Photo, ReadsWorldFilesOfItsOwnExtension) {
 }
 
 TEST_F(Photo, ReportsAMissingAndADamagedFileInOneLine) {
-  EXPECT_EQ(error_of([&] { (void)open_photo(folder_ / "none.jpg"); }).code(), ErrorCode::kIo);
+  EXPECT_EQ(error_of([&] { (void)open_photo(folder / "none.jpg"); }).code(), ErrorCode::kIo);
   const std::string text = write("notes.txt", "this is no picture");
   const Error unknown = error_of([&] { (void)open_photo(text); });
   EXPECT_EQ(unknown.code(), ErrorCode::kUnsupported);

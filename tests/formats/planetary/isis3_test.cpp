@@ -69,23 +69,13 @@ std::string tiles(int tile_columns, int tile_rows, int bands, bool big_endian) {
   return bytes;
 }
 
-class Isis3 : public testing::Test {
+class Isis3 : public test::ReaderTest {
  protected:
-  std::string write(const std::string& bytes) const {
-    const std::string path = folder_ / "a.cub";
-    test::write_file(path, bytes);
-    return path;
-  }
+  std::string write(const std::string& bytes) const { return ReaderTest::write("a.cub", bytes); }
 
   std::string failure(const std::string& bytes, ErrorCode* code = nullptr) const {
-    const std::string path = write(bytes);
-    return test::failure_of(path, code, [&] {
-      const auto source = open_isis3(path, {});
-      test::read_corner(*source);
-    });
+    return failure_at(write(bytes), code, open_isis3);
   }
-
-  const test::TemporaryFolder folder_;
 };
 
 TEST_F(Isis3, WindowsEqualTheWholeInEveryLayout) {
@@ -110,15 +100,15 @@ TEST_F(Isis3, WindowsEqualTheWholeInEveryLayout) {
 TEST_F(Isis3, FollowsADetachedLabelToItsCore) {
   const std::string whole = label(kTiles, 1, kWord) + tiles(3, 2, 1, false);
   std::string text = label(std::string("^Core = DATA.cub\n") + kTiles, 1, kWord);
-  test::write_file(folder_ / "whole.cub", whole);
-  test::write_file(folder_ / "data.CUB", std::string(kLabelBytes, 'x') + tiles(3, 2, 1, false));
-  const std::string path = folder_ / "outside.lbl";
+  test::write_file(folder / "whole.cub", whole);
+  test::write_file(folder / "data.CUB", std::string(kLabelBytes, 'x') + tiles(3, 2, 1, false));
+  const std::string path = folder / "outside.lbl";
   test::write_file(path, text);
-  const auto expected = open_raster(folder_ / "whole.cub", {});
+  const auto expected = open_raster(folder / "whole.cub", {});
   const auto source = open_raster(path, {});
   EXPECT_EQ(test::read_whole(*source), test::read_whole(*expected));
   EXPECT_EQ(source->info().georeference.origin_x, expected->info().georeference.origin_x);
-  std::filesystem::remove(folder_ / "data.CUB");
+  std::filesystem::remove(folder / "data.CUB");
   ErrorCode code = ErrorCode::kCancelled;
   EXPECT_THAT(test::failure_of(path, &code, [&] { (void)open_raster(path, {}); }),
               HasSubstr("^Core names DATA.cub, which must be a file beside the label"));

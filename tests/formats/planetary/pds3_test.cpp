@@ -18,24 +18,12 @@ namespace {
 
 using ::testing::HasSubstr;
 
-class Pds3 : public testing::Test {
+class Pds3 : public test::ReaderTest {
  protected:
-  std::string write(const std::string& name, const std::string& bytes) const {
-    const std::string path = folder_ / name;
-    test::write_file(path, bytes);
-    return path;
-  }
-
   /// What opening and reading the first samples of `bytes` says; empty where it works.
   std::string failure(const std::string& bytes, ErrorCode* code = nullptr) {
-    const std::string path = write("a.img", bytes);
-    return test::failure_of(path, code, [&] {
-      const auto source = open_pds3(path, {});
-      test::read_corner(*source);
-    });
+    return failure_at(write("a.img", bytes), code, open_pds3);
   }
-
-  const test::TemporaryFolder folder_;
 };
 
 const char* const kImage =
