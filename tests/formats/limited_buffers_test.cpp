@@ -17,13 +17,9 @@ constexpr std::int64_t kHeight = 300;
 constexpr std::size_t kRowBytes = kWidth * 2;
 
 std::vector<std::byte> write_counting(const std::string& path, SampleType type) {
-  RasterSpec spec;
-  spec.width = kWidth;
-  spec.height = kHeight;
-  spec.sample_type = type;
   std::vector<std::byte> samples(kRowBytes * kHeight);
   for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = static_cast<std::byte>(i * 37 % 61);
-  write_raster(path, spec, samples);
+  write_raster(path, raster_spec(kWidth, kHeight, type), samples);
   return samples;
 }
 

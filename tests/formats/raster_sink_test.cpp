@@ -32,15 +32,6 @@ constexpr SampleType kAllTypes[] = {SampleType::kUint8,   SampleType::kInt8,    
                                     SampleType::kInt16,   SampleType::kUint32,  SampleType::kInt32,
                                     SampleType::kFloat16, SampleType::kFloat32, SampleType::kFloat64};
 
-RasterSpec spec_of(std::int64_t width, std::int64_t height, SampleType type, int channels = 1) {
-  RasterSpec spec;
-  spec.width = width;
-  spec.height = height;
-  spec.sample_type = type;
-  spec.channels = channels;
-  return spec;
-}
-
 /// Any bits are samples that must come back, infinities, NaNs and subnormals too, but for what is larger than any ground.
 std::vector<std::byte> noise(const RasterSpec& spec) {
   std::vector<std::byte> samples(static_cast<std::size_t>(spec.width * spec.height * spec.channels) *
@@ -96,7 +87,7 @@ TEST_F(RasterSink, RoundTripsEverySampleTypeAndChannel) {
       for (const int channels : {1, 3, 4}) {
         for (const std::int64_t run : {1, 7, 100}) {
           SCOPED_TRACE(extension + " " + to_string(type) + " x" + std::to_string(channels));
-          const RasterSpec spec = spec_of(37, 23, type, channels);
+          const RasterSpec spec = raster_spec(37, 23, type, channels);
           const auto samples = noise(spec);
           const std::string path = folder / ("raster" + std::to_string(run) + extension);
           std::filesystem::remove(path);
@@ -120,7 +111,7 @@ TEST_F(RasterSink, RoundTripsEverySampleTypeAndChannel) {
 TEST_F(RasterSink, RoundTripsManyStripsAndLongRows) {
   for (const auto& [width, height] : {std::pair{3000, 400}, {200000, 3}, {1, 5000}}) {
     for (const std::string extension : {".tif", ".exr"}) {
-      const RasterSpec spec = spec_of(width, height, SampleType::kFloat32);
+      const RasterSpec spec = raster_spec(width, height, SampleType::kFloat32);
       const auto samples = noise(spec);
       const std::string path = folder / (std::to_string(width) + extension);
       write(path, spec, samples, 33);
@@ -130,7 +121,7 @@ TEST_F(RasterSink, RoundTripsManyStripsAndLongRows) {
 }
 
 RasterSpec placed(std::int64_t width, std::int64_t height, SampleType type, double spacing_y) {
-  RasterSpec spec = spec_of(width, height, type);
+  RasterSpec spec = raster_spec(width, height, type);
   spec.georeference = place_at(Registration::kArea, HorizontalUnit::kMetre, 500005.0, 4000195.0, 10.0, 32632);
   spec.georeference->spacing_y = spacing_y;
   spec.georeference->system.name = "WGS 84 / UTM zone 32N";
@@ -271,7 +262,7 @@ TEST_F(RasterSink, RefusesADescriptionThatIsWrong) {
 
 TEST_F(RasterSink, BeginsBigTiffWhereClassicTiffEnds) {
   for (const auto& [side, magic] : {std::pair{1000, 42}, {40000, 43}}) {
-    const auto sink = create_raster(folder / "large.tif", spec_of(side, side, SampleType::kFloat32));
+    const auto sink = create_raster(folder / "large.tif", raster_spec(side, side, SampleType::kFloat32));
     const std::string head = read_file(folder / "large.tif.part");
     ASSERT_GE(head.size(), 4U);
     EXPECT_EQ(head[2], magic);
@@ -279,14 +270,14 @@ TEST_F(RasterSink, BeginsBigTiffWhereClassicTiffEnds) {
 }
 
 TEST_F(RasterSink, WritesHgtTilesOfTheSizesThatExist) {
-  const RasterSpec spec = spec_of(1201, 1201, SampleType::kInt16);
+  const RasterSpec spec = raster_spec(1201, 1201, SampleType::kInt16);
   const auto samples = noise(spec);
   const std::string path = folder / "N44E006.hgt";
   write(path, spec, samples, 100);
   EXPECT_EQ(std::filesystem::file_size(path), 1201U * 1201U * 2U);
   EXPECT_EQ(read_whole(*open_raster(path, {})), samples);
-  for (const auto& bad : {spec_of(1200, 1201, SampleType::kInt16), spec_of(1201, 1201, SampleType::kUint16),
-                          spec_of(1201, 1201, SampleType::kInt16, 3)}) {
+  for (const auto& bad : {raster_spec(1200, 1201, SampleType::kInt16), raster_spec(1201, 1201, SampleType::kUint16),
+                          raster_spec(1201, 1201, SampleType::kInt16, 3)}) {
     EXPECT_EQ(code_of(folder / "N44E007.hgt", bad), ErrorCode::kInvalidArgument);
   }
   RasterSpec other_void = spec;
@@ -300,7 +291,7 @@ TEST_F(RasterSink, KeepsVoidScaleAndUnitInTiff) {
                                     {SampleType::kFloat32, static_cast<double>(-3.4028235e38F)},
                                     {SampleType::kFloat64, 1e-300},
                                     {SampleType::kUint8, 0.0}}) {
-    RasterSpec spec = spec_of(5, 4, type);
+    RasterSpec spec = raster_spec(5, 4, type);
     spec.void_value = value;
     spec.z_scale = 0.1;
     spec.z_offset = -11000.0;
@@ -319,7 +310,7 @@ TEST_F(RasterSink, KeepsVoidScaleAndUnitInTiff) {
 
 TEST_F(RasterSink, KeepsTransparentGrayInPng) {
   const std::string path = folder / "void.png";
-  RasterSpec spec = spec_of(5, 4, SampleType::kUint16);
+  RasterSpec spec = raster_spec(5, 4, SampleType::kUint16);
   spec.void_value = 65535.0;
   write(path, spec, noise(spec), 4);
   EXPECT_EQ(open_raster(path, {})->info().void_values, std::vector<double>{65535.0});
@@ -331,7 +322,7 @@ TEST_F(RasterSink, LeavesNothingBehindUnlessFinished) {
   for (const char* extension : {".tif", ".exr", ".png"}) {
     const std::string path = folder / (std::string("half") + extension);
     const RasterSpec spec =
-        spec_of(16, 16, std::string(extension) == ".exr" ? SampleType::kFloat32 : SampleType::kUint16);
+        raster_spec(16, 16, std::string(extension) == ".exr" ? SampleType::kFloat32 : SampleType::kUint16);
     const auto samples = noise(spec);
     {
       const auto sink = create_raster(path, spec);
@@ -349,7 +340,7 @@ TEST_F(RasterSink, LeavesNothingBehindUnlessFinished) {
 
 TEST_F(RasterSink, ReplacesAFileOnlyWhenTold) {
   const std::string path = folder / "here.tif";
-  RasterSpec spec = spec_of(4, 4, SampleType::kInt16);
+  RasterSpec spec = raster_spec(4, 4, SampleType::kInt16);
   write(path, spec, noise(spec), 4);
   const Error error = error_of([&] { (void)create_raster(path, spec); });
   EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
@@ -363,15 +354,15 @@ TEST_F(RasterSink, ReplacesAFileOnlyWhenTold) {
 }
 
 TEST_F(RasterSink, RefusesWhatItCannotWriteAndLeavesNothing) {
-  const RasterSpec good = spec_of(4, 4, SampleType::kFloat32);
+  const RasterSpec good = raster_spec(4, 4, SampleType::kFloat32);
   const Error error = error_of([&] { (void)create_raster(folder / "a.jpg", good); });
   EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
   EXPECT_THAT(error.what(), HasSubstr("\".jpg\"; there are .tif .tiff .exr .png .hgt .asc .flt .r16 .raw .r32 .npy"));
   for (const auto& [name, bad] : {std::pair{"a", good},
                                   {"a.png", good},
-                                  {"a.exr", spec_of(4, 4, SampleType::kInt16)},
-                                  {"a.tif", spec_of(0, 4, SampleType::kInt16)},
-                                  {"a.tif", spec_of(4, 4, SampleType::kInt16, 2)}}) {
+                                  {"a.exr", raster_spec(4, 4, SampleType::kInt16)},
+                                  {"a.tif", raster_spec(0, 4, SampleType::kInt16)},
+                                  {"a.tif", raster_spec(4, 4, SampleType::kInt16, 2)}}) {
     EXPECT_EQ(code_of(folder / name, bad), ErrorCode::kInvalidArgument) << name;
   }
   EXPECT_EQ(code_of(folder / "none/a.tif", good), ErrorCode::kIo);
@@ -434,10 +425,10 @@ class FileSizeLimit {
 
 TEST_F(RasterSink, ReportsADiskThatIsFull) {
   for (const std::string name : {"full.tif", "full.exr", "full.png", "N00E000.hgt", "full.asc", "full.npy"}) {
-    const RasterSpec spec = spec_of(1201, 1201,
-                                    name == "full.exr"   ? SampleType::kFloat32
-                                    : name == "full.png" ? SampleType::kUint16
-                                                         : SampleType::kInt16);
+    const RasterSpec spec = raster_spec(1201, 1201,
+                                        name == "full.exr"   ? SampleType::kFloat32
+                                        : name == "full.png" ? SampleType::kUint16
+                                                             : SampleType::kInt16);
     const auto samples = noise(spec);
     // Noise does not compress: each limit falls into the samples, the last one into what follows them.
     for (const std::size_t limit : {std::size_t{100}, samples.size() / 2, samples.size() - 1000}) {
@@ -455,7 +446,7 @@ TEST_F(RasterSink, RefusesWhatNoDiskHasRoomForAndLeavesNothing) {
   constexpr std::int64_t kSide = std::numeric_limits<std::int32_t>::max();
   for (const std::string name : {"a.npy", "a.flt", "a.r32", "a.asc", "a.tif", "a.exr"}) {
     for (const bool compress : {false, true}) {
-      RasterSpec spec = spec_of(kSide, kSide, SampleType::kFloat32);
+      RasterSpec spec = raster_spec(kSide, kSide, SampleType::kFloat32);
       spec.compress = compress;
       const Error error = error_of([&] { (void)create_raster(folder / name, spec); });
       EXPECT_EQ(error.code(), ErrorCode::kIo) << error.what();
@@ -465,13 +456,13 @@ TEST_F(RasterSink, RefusesWhatNoDiskHasRoomForAndLeavesNothing) {
   }
   EXPECT_THAT(folder.names(), testing::IsEmpty());
   // Together where one alone would fit.
-  RasterSpec spec = spec_of(1, 1, SampleType::kFloat32);
+  RasterSpec spec = raster_spec(1, 1, SampleType::kFloat32);
   EXPECT_NO_THROW(check_raster_room(folder / "a.r32", spec));
   EXPECT_EQ(error_of([&] { check_raster_room(folder / "a.r32", spec, std::int64_t{1} << 60); }).code(), ErrorCode::kIo);
 }
 
 TEST_F(RasterSink, NeverLeavesOldSamplesBesideANewDescription) {
-  RasterSpec spec = spec_of(6, 4, SampleType::kUint16);
+  RasterSpec spec = raster_spec(6, 4, SampleType::kUint16);
   const auto samples = noise(spec);
   write(folder / "a.r16", spec, samples, 4);
   const std::string old_description = read_file(folder / "a.r16.json");

@@ -31,11 +31,7 @@ std::string counting(int count, int size) {
 /// Written by isohf's own writer.
 std::string written(const TemporaryFolder& folder, const std::string& name, std::int64_t width, std::int64_t height,
                     SampleType type, int channels = 1) {
-  RasterSpec spec;
-  spec.width = width;
-  spec.height = height;
-  spec.sample_type = type;
-  spec.channels = channels;
+  RasterSpec spec = raster_spec(width, height, type, channels);
   spec.overwrite = true;
   spec.describe = name == "described.png";
   spec.georeference = place_at(Registration::kArea, HorizontalUnit::kMetre, 5e5, 4e6, 10.0, 32632);

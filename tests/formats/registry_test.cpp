@@ -64,15 +64,11 @@ TEST(OpenSource, NamesWhatIsWrongWithAPath) {
 TEST(OpenSource, NoticesAFileThatChangesWhileItIsRead) {
   namespace fs = std::filesystem;
   const TemporaryFolder folder;
-  RasterSpec spec;
-  spec.width = 40;
-  spec.height = 30;
   const std::vector<std::byte> rows(40 * 30 * 2);
-  spec.sample_type = SampleType::kUint16;
   for (const std::string name : {"a.tif", "a.png", "a.r16", "a.npy", "a.asc"}) {
     SCOPED_TRACE(name);
     const std::string path = folder / name;
-    write_raster(path, spec, rows);
+    write_raster(path, raster_spec(40, 30, SampleType::kUint16), rows);
     const std::string whole = read_file(path);
     const auto source = open_raster(path, {});
     const Window window = {0, 0, source->info().width, 1};

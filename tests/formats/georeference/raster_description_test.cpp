@@ -28,10 +28,7 @@ using ::testing::IsEmpty;
 
 /// 2 x 2 codes 0, 100, 65535 and a void one, in degrees on posts.
 RasterSpec picture_spec() {
-  RasterSpec spec;
-  spec.width = 2;
-  spec.height = 2;
-  spec.sample_type = SampleType::kUint16;
+  RasterSpec spec = raster_spec(2, 2, SampleType::kUint16);
   spec.describe = true;
   spec.overwrite = true;
   spec.z_scale = 0.25;

@@ -47,10 +47,7 @@ struct CutRaster {
 /// A georeferenced raster without samples: EPSG 32632, 30 m, or WGS 84 with `degrees`.
 inline RasterSpec placed_spec(std::int64_t width, std::int64_t height, SampleType type, Registration registration,
                               bool degrees = false) {
-  RasterSpec spec;
-  spec.width = width;
-  spec.height = height;
-  spec.sample_type = type;
+  RasterSpec spec = raster_spec(width, height, type);
   spec.georeference = degrees ? place_at(registration, HorizontalUnit::kDegree, 7.0, 46.0, 1.0 / 1200.0, 4326)
                               : place_at(registration, HorizontalUnit::kMetre, 500015.0, 5200000.0, 30.0, 32632);
   return spec;

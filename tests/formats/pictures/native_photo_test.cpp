@@ -23,18 +23,13 @@ class NativePhoto : public ReaderTest {
  protected:
   /// Noise as a raster file of bytes.
   std::string write_noise(const std::string& name, int width, int height, int channels) {
-    RasterSpec spec;
-    spec.width = width;
-    spec.height = height;
-    spec.channels = channels;
-    spec.sample_type = SampleType::kUint8;
     std::vector<std::byte> samples;
     for (int row = 0; row < height; ++row) {
       for (int column = 0; column < width; ++column) {
         for (int c = 0; c < channels; ++c) samples.push_back(static_cast<std::byte>(noise(column, row, c)));
       }
     }
-    write_raster(folder / name, spec, samples);
+    write_raster(folder / name, raster_spec(width, height, SampleType::kUint8, channels), samples);
     return folder / name;
   }
 };
@@ -111,11 +106,7 @@ TEST_F(NativePhoto, LoadsNoModuleForPngJpegAndTiff) {
 
 TEST_F(NativePhoto, RoundsSixteenBitsAndExpandsPalettesOfPng) {
   std::array<std::uint16_t, 6> deep = {0, 65535, 257 * 100, 257 * 100 + 128, 257 * 100 + 129, 300};
-  RasterSpec spec;
-  spec.width = 6;
-  spec.height = 1;
-  spec.sample_type = SampleType::kUint16;
-  write_raster(folder / "deep.png", spec, std::as_bytes(std::span(deep)));
+  write_raster(folder / "deep.png", raster_spec(6, 1, SampleType::kUint16), std::as_bytes(std::span(deep)));
   EXPECT_EQ(window_of(*open_photo(folder / "deep.png"), {0, 0, 6, 1}),
             (std::vector<std::uint8_t>{0, 255, 100, 100, 101, 1}));
 

@@ -20,6 +20,7 @@
 namespace isohf::test {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 struct Picture {
@@ -225,7 +226,9 @@ TEST_F(PngSource, TakesTransparentPixelsOfPackedElevationsAsVoid) {
 TEST_F(PngSource, UnpacksElevationsOutOfAPalette) {
   Picture picture{.bit_depth = 2, .color_type = PNG_COLOR_TYPE_PALETTE};
   write_picture(path, picture);
-  EXPECT_THAT(error_of([&] { (void)open_raster(path, {}); }).what(), HasSubstr("unless these are packed into them"));
+  const Error error = error_of([&] { (void)open_raster(path, {}); });
+  EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
+  EXPECT_THAT(error.what(), AllOf(HasSubstr("palette"), HasSubstr("unless these are packed into them")));
   const std::vector<double> values = values_of(*open_raster(path, of_channel("mapbox")));
   for (std::uint32_t row = 0; row < picture.height; ++row) {
     for (std::uint32_t column = 0; column < picture.width; ++column) {
@@ -308,17 +311,9 @@ TEST_F(PngSource, TakesTransparentGrayAsVoid) {
   EXPECT_EQ(error_of([&] { (void)open_png(path, {}); }).code(), ErrorCode::kCorrupt);
 }
 
-TEST_F(PngSource, RefusesPalettesAndUnknownChannels) {
-  Picture picture{.bit_depth = 2, .color_type = PNG_COLOR_TYPE_PALETTE};
-  write_picture(path, picture);
-  Error error = error_of([&] { (void)open_png(path, {}); });
-  EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
-  EXPECT_THAT(error.what(), HasSubstr("palette"));
-
-  picture.bit_depth = 8;
-  picture.color_type = PNG_COLOR_TYPE_RGB;
-  write_picture(path, picture);
-  error = error_of([&] { (void)open_png(path, of_channel("Z")); });
+TEST_F(PngSource, RefusesUnknownChannels) {
+  write_picture(path, {.bit_depth = 8, .color_type = PNG_COLOR_TYPE_RGB});
+  const Error error = error_of([&] { (void)open_png(path, of_channel("Z")); });
   EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
   EXPECT_THAT(error.what(), HasSubstr(path + ": has no channel \"Z\"; it has R, G, B (or 0...2)"));
 }

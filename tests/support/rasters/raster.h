@@ -32,6 +32,16 @@ inline Raster read_raster(const std::string& path, const OpenOptions& options = 
   return raster;
 }
 
+/// A raster without a place.
+inline RasterSpec raster_spec(std::int64_t width, std::int64_t height, SampleType type, int channels = 1) {
+  RasterSpec spec;
+  spec.width = width;
+  spec.height = height;
+  spec.sample_type = type;
+  spec.channels = channels;
+  return spec;
+}
+
 inline void write_raster(const std::string& path, const RasterSpec& spec, std::span<const std::byte> samples) {
   const auto sink = create_raster(path, spec);
   sink->write_rows(samples);
