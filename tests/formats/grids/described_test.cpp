@@ -164,9 +164,7 @@ TEST_F(Netcdf, LongitudesMayComeBeforeLatitudes) {
   file.dimension("lon", 3).dimension("lat", 2);
   file.variable("lon", {0}, 6, big_endian<double>({10.0, 10.5, 11.0}), {{"units", "degrees_east"}});
   file.variable("lat", {1}, 6, big_endian<double>({40.0, 40.5}), {{"units", "degrees_north"}});
-  file.variable("z", {0, 1}, 3, big_endian<std::int16_t>({1, 2, 3, 4, 5, 6}), {});
-  write("a.nc", file.bytes());
-  const auto source = open("a.nc");
+  const auto source = open_z(file, big_endian<std::int16_t>({1, 2, 3, 4, 5, 6}));
   ASSERT_EQ(source->info().width, 3);
   ASSERT_EQ(source->info().height, 2);
   EXPECT_THAT(values_of(*source), ElementsAre(2, 4, 6, 1, 3, 5));  // the South comes first
@@ -317,9 +315,7 @@ TEST_F(Netcdf, UnitsOfCoordinatesAreReadOrTold) {
     file.dimension("y", 2).dimension(axis, 2);
     file.variable(axis, {1}, 6, big_endian<double>({0.25, 0.5}), {{"units", unit}});
     file.variable("y", {0}, 6, big_endian<double>({0.75, 0.5}), {{"units", unit}});
-    file.variable("z", {0, 1}, 3, std::string(8, '\1'), {});
-    write("a.nc", file.bytes());
-    return open("a.nc");
+    return open_z(file, std::string(8, '\1'));
   };
   const auto feet = with("x", "US_survey_foot");
   EXPECT_EQ(feet->info().georeference.unit, HorizontalUnit::kMetre);
