@@ -47,6 +47,6 @@ named = re.findall(r"`([a-z0-9]+(?:-[a-z0-9]+)*-?…?)`", faults)
 for name in manifest["refuse"]:
     if not any(name == told or told.endswith("-…") and name.startswith(told[:-1]) for told in named):
         failures.append("%s: the page does not name it" % name)
-assert len(manifest["good"]) >= 75 and len(manifest["refuse"]) >= 85
+assert len(manifest["good"]) >= 74 and len(manifest["refuse"]) >= 85
 print("\n".join(failures))
 sys.exit(bool(failures))
