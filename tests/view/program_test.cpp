@@ -307,9 +307,10 @@ TEST_F(ViewProgramTest, LeavesNothingInAFolderThatIsTooSmallForARaster) {
 }
 
 TEST_F(ViewProgramTest, ReadsItsPartOfAConfigFileForAllCommands) {
-  test::write_file(path("all.toml"),
-                   "quiet = true\ndensity = 0.5\n[convert]\neffort = \"fast\"\n[view]\nsize = \"64x48\"\nquiet = false\n"
-                   "json = true\nposition = [480, 300, 900]\n");
+  test::write_file(
+      path("all.toml"),
+      "quiet = true\ndensity = 0.5\n[convert]\neffort = \"fast\"\n[view]\nsize = \"64x48\"\nquiet = false\n"
+      "json = true\nposition = [480, 300, 900]\n");
   const Outcome drawn =
       run(path("good.isohf") + " --config " + path("all.toml") + " --screenshot " + path("config.png"));
   EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
