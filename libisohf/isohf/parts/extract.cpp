@@ -123,7 +123,7 @@ class Extraction {
           if (seeds_) seeds.add(some[i].seeds);
         }
       }
-      if (seeds_) add_seeds(row, seeds);
+      if (seeds_) seeds_->write(seeds, row, writer_);
       job_.report({"tiles", "tiles", (row + 1) * columns, metadata_.grid.tile_count(), writer_.bytes_written()});
     }
     for (const MemberEntry& member : from_.loose_members()) {
@@ -193,16 +193,6 @@ class Extraction {
     for (const auto& [member, name] : members) copy(member, name);
   }
 
-  void add_seeds(std::int64_t row, const SeedRow::Tiles& tiles) {
-    seeds_->encode(tiles, [&](std::size_t first, std::span<const EncodedSeeds> members) {
-      for (std::size_t i = 0; i < members.size(); ++i) {
-        if (members[i].payload_bytes == 0) continue;
-        writer_.add_deflated_member(seed_name({static_cast<std::int64_t>(first + i), row}), members[i].deflated,
-                                    members[i].payload_bytes, members[i].payload_crc32);
-      }
-    });
-  }
-
   const ArchiveReader& from_;
   int plane_;
   TileRange tiles_;
@@ -258,12 +248,7 @@ PartSummary extract_tiles(const std::string& archive, const std::string& output,
         loss(archive + ": residuals are left out; the samples of the source come back to within the step alone"));
   }
   if (options.strict && !summary.warnings.empty()) throw error_from(summary.warnings);
-  WriterOptions how;
-  how.overwrite = options.overwrite;
-  how.journal = false;  // copying again takes no longer than a look at what is there
-  how.planes = metadata.planes;
-  how.type = metadata.quantisation.type;
-  ArchiveWriter writer(output, metadata.grid, how);
+  ArchiveWriter writer(output, metadata.grid, options_while_copying(metadata, options));
   Arena(job).execute([&] {
     const std::unique_ptr<PlaneStage> planes = planes_while_copying(metadata, writer, output);
     Extraction(reader, plane, tiles, metadata, writer, planes.get(), job).run();
@@ -273,10 +258,7 @@ PartSummary extract_tiles(const std::string& archive, const std::string& output,
   // These are not known of each tile. They are no more than in the whole.
   metadata.statistics.worst_rounding = before.worst_rounding;
   metadata.statistics.clamped = before.clamped;
-  count_members(writer, metadata);
-  summary.tiles_stored = writer.tiles_stored();
-  summary.content_sha256 = writer.content_hash(metadata);
-  summary.archive_bytes = writer.finish(metadata);
+  finish_copy(writer, metadata, summary);
   return summary;
 }
 

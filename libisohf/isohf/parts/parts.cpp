@@ -32,6 +32,9 @@ void set_extension(Metadata& metadata, const char* name, std::string text) {
     metadata.extensions.emplace_back(name, std::move(text));
 }
 
+namespace {
+
+/// Writes in the metadata how many seeds and textures were written, and how large they are.
 void count_members(const ArchiveWriter& writer, Metadata& metadata) {
   const auto count = [&](auto info, const char* folder, const char* name, auto format) {
     if (!info) return;
@@ -43,6 +46,8 @@ void count_members(const ArchiveWriter& writer, Metadata& metadata) {
   count(shadow_seed_info(metadata), "seeds/", kShadowSeedsName, format_shadow_seed_info);
   count(texture_info(metadata), kTextureFolder, kTileTexturesName, format_texture_info);
 }
+
+}  // namespace
 
 std::string text_of(const TileRange& tiles) {
   return fmt::format("columns {} to {} and rows {} to {}", tiles.first.column, tiles.end.column - 1, tiles.first.row,
@@ -86,6 +91,22 @@ std::unique_ptr<PlaneStage> planes_while_copying(const Metadata& metadata, Archi
   if (plane_builder_memory_bytes(all, type, false) > kMostPlaneBytes) scratch = folder_of(output);
   return std::make_unique<PlaneStage>(all, metadata.quantisation, metadata.effort.value_or(Effort::kDefault), writer,
                                       RowRange{0, metadata.grid.tile_rows() - 1}, nullptr, scratch);
+}
+
+WriterOptions options_while_copying(const Metadata& metadata, const PartOptions& options) {
+  WriterOptions how;
+  how.overwrite = options.overwrite;
+  how.journal = false;  // copying again takes no longer than a look at what is there
+  how.planes = metadata.planes;
+  how.type = metadata.quantisation.type;
+  return how;
+}
+
+void finish_copy(ArchiveWriter& writer, Metadata& metadata, PartSummary& summary) {
+  count_members(writer, metadata);
+  summary.tiles_stored = writer.tiles_stored();
+  summary.content_sha256 = writer.content_hash(metadata);
+  summary.archive_bytes = writer.finish(metadata);
 }
 
 }  // namespace isohf

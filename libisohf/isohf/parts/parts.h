@@ -27,7 +27,10 @@ void require_copyable(const ArchiveReader& archive);
 
 void drop_extension(Metadata& metadata, const char* name);
 void set_extension(Metadata& metadata, const char* name, std::string text);
-/// Writes in the metadata how many seeds and textures were written, and how large they are.
-void count_members(const ArchiveWriter& writer, Metadata& metadata);
+
+/// How an archive of copied tiles is written.
+[[nodiscard]] WriterOptions options_while_copying(const Metadata& metadata, const PartOptions& options);
+/// Completes the archive. Its metadata get the number and size of the seeds and textures that were written.
+void finish_copy(ArchiveWriter& writer, Metadata& metadata, PartSummary& summary);
 
 }  // namespace isohf

@@ -242,12 +242,7 @@ PartSummary merge_shards(const std::vector<std::string>& files, const std::strin
   const TileGrid grid = metadata->grid;
   if (rows.back().second != grid.tile_rows())
     throw Error(ErrorCode::kCorrupt, shards.back()->path + ": does not end with the last row of tiles");
-  WriterOptions how;
-  how.overwrite = options.overwrite;
-  how.journal = false;  // copying again takes no longer than a look at what is there
-  how.planes = metadata->planes;
-  how.type = metadata->quantisation.type;
-  ArchiveWriter writer(output, grid, how);
+  ArchiveWriter writer(output, grid, options_while_copying(*metadata, options));
   Arena(job).execute([&] {
     const std::unique_ptr<PlaneStage> planes = planes_while_copying(*metadata, writer, output);
     Assembly assembly(*metadata, writer, std::move(inputs), planes.get(),
@@ -258,11 +253,8 @@ PartSummary merge_shards(const std::vector<std::string>& files, const std::strin
       set_extension(*metadata, kLosslessName, format_lossless(*record));
     }
   });
-  count_members(writer, *metadata);
   PartSummary summary;
-  summary.tiles_stored = writer.tiles_stored();
-  summary.content_sha256 = writer.content_hash(*metadata);
-  summary.archive_bytes = writer.finish(*metadata);
+  finish_copy(writer, *metadata, summary);
   return summary;
 }
 

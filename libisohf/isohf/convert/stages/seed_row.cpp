@@ -7,6 +7,8 @@
 #include <limits>
 #include <utility>
 
+#include "isohf/archive/writer.h"
+
 namespace isohf {
 namespace {
 
@@ -138,6 +140,16 @@ std::uint64_t SeedRow::memory_bytes(const TileGrid& grid, bool in_scratch) {
   if (!in_scratch) return in_memory;
   return std::min(in_memory, kSpillBytes + tiles * (sizeof(Tiles::Place) + sizeof(std::uint64_t)) +
                                  kTilesAtOnce * rows * kBytesPerRow);
+}
+
+void SeedRow::write(const Tiles& tiles, std::int64_t row, ArchiveWriter& writer) const {
+  encode(tiles, [&](std::size_t first, std::span<const EncodedSeeds> members) {
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      if (members[i].payload_bytes == 0) continue;
+      writer.add_deflated_member(seed_name({static_cast<std::int64_t>(first + i), row}), members[i].deflated,
+                                 members[i].payload_bytes, members[i].payload_crc32);
+    }
+  });
 }
 
 }  // namespace isohf

@@ -10,6 +10,8 @@
 
 namespace isohf {
 
+class ArchiveWriter;
+
 /// Shadow seeds of one row of tiles: what its tiles cast over each other's edges. They depend on the tiles' codes and
 /// on nothing else, bit for bit.
 class SeedRow {
@@ -52,6 +54,8 @@ class SeedRow {
   /// On the caller's oneTBB arena.
   using Take = std::function<void(std::size_t first, std::span<const EncodedSeeds> members)>;
   void encode(const Tiles& tiles, const Take& take) const;
+  /// Writes the members of row `row`. On the caller's oneTBB arena.
+  void write(const Tiles& tiles, std::int64_t row, ArchiveWriter& writer) const;
 
   /// Peak memory of a row's Tiles and of encode(), bytes; an estimate.
   [[nodiscard]] static std::uint64_t memory_bytes(const TileGrid& grid, bool in_scratch);

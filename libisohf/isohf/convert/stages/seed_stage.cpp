@@ -48,13 +48,7 @@ void SeedStage::add(TileIndex index, const Tile& tile, ArchiveWriter& writer) {
 }
 
 void SeedStage::finish_row(std::int64_t row, ArchiveWriter& writer) {
-  row_.encode(tiles_, [&](std::size_t first, std::span<const EncodedSeeds> members) {
-    for (std::size_t i = 0; i < members.size(); ++i) {
-      if (members[i].payload_bytes == 0) continue;
-      writer.add_deflated_member(seed_name({static_cast<std::int64_t>(first + i), row}), members[i].deflated,
-                                 members[i].payload_bytes, members[i].payload_crc32);
-    }
-  });
+  row_.write(tiles_, row, writer);
   tiles_.clear();
 }
 
