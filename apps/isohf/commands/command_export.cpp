@@ -12,7 +12,6 @@
 #include "commands/export_tiles.h"
 #include "formats/adapters/cropped_source.h"
 #include "formats/georeference/reference_system.h"
-#include "formats/io/text.h"
 #include "input/box_ground.h"
 #include "input/input_files.h"
 #include "input/options_source.h"
@@ -161,8 +160,7 @@ std::optional<ExportOptions> parse_export(const Arguments& arguments) {
   if (!line.parse(arguments)) return std::nullopt;
   line.require("ARCHIVE", options.archive);
   line.require("OUTPUT", options.output);
-  const bool is_archive_name = lower_case(std::filesystem::path(options.output).extension().string()) == ".isohf";
-  if (is_archive_name && options.archive != options.output) {
+  if (is_archive_name(options.output) && options.archive != options.output) {
     throw Error(ErrorCode::kInvalidArgument,
                 options.output + ": OUTPUT has an archive's name; ARCHIVE comes first, OUTPUT last");
   }

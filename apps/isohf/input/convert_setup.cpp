@@ -11,7 +11,6 @@
 #include <set>
 
 #include "formats/io/file_stamp.h"
-#include "formats/io/text.h"
 #include "input/input_files.h"
 #include "input/options_ground.h"
 #include "input/options_lattice.h"
@@ -59,10 +58,6 @@ Examples:
   isohf plan dem.tif                  the same options without writing: see what comes out
   isohf convert --each tiles/ --recursive --out-dir archives --keep-going    one of each
   isohf convert --each tiles/ --recursive --out-dir archives --resume        goes on)";
-
-bool is_archive_name(const std::string& name) {
-  return lower_case(name).ends_with(".isohf");
-}
 
 /// The last name is the output where -o names none and it is called .isohf. Any other name is an input: a forgotten
 /// output must not cost the last of them.

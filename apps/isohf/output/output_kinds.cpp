@@ -1,5 +1,6 @@
 #include "output/output_kinds.h"
 
+#include "formats/io/text.h"
 #include "formats/registry.h"
 #include "formats/write/encoders.h"
 #include "formats/write/raster_sink.h"
@@ -36,6 +37,10 @@ std::string kind_of(const std::string& path) {
 }
 
 }  // namespace
+
+bool is_archive_name(const std::string& name) {
+  return lower_case(name).ends_with(".isohf");
+}
 
 void check_archive_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite) {
   const std::string place = check_output_place(inputs, output);
