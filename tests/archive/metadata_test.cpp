@@ -169,6 +169,26 @@ TEST(Metadata, NamesWhatIsWrong) {
   EXPECT_NO_THROW((void)parse_metadata(replaced(json, "\"version\": 2", "\"version\": 2, \"requires\": []")));
 }
 
+TEST(ShardRecord, RefusesRowsAndNumbersThatNoConversionHas) {
+  const auto read = [](const ShardRecord& record) {
+    Metadata metadata(TileGrid::make(TileShape::make(12, 11, 3), 2, 3, 1.0, 1.0));
+    metadata.extensions.emplace_back(kShardName, format_shard_record(record));
+    return shard_record(metadata);
+  };
+  EXPECT_EQ(read({"", 2, 3, 1, 2, {0.0}})->number, 2);
+  for (const ShardRecord& wrong : std::vector<ShardRecord>{{"", 1, 4, 0, 1, {0.0}},
+                                                           {"", 1, 2000000000, 0, 1, {0.0}},
+                                                           {"", 4, 3, 0, 1, {0.0}},
+                                                           {"", 1, 3, -1, 0, {0.0}},
+                                                           {"", 1, 3, 1, 1, {}},
+                                                           {"", 1, 3, 2, 4, {0.0, 0.0}},
+                                                           {"", 1, 3, 0, 2, {0.0}}}) {
+    const Error error = test::error_of([&] { (void)read(wrong); });
+    EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+    EXPECT_THAT(error.what(), testing::HasSubstr("shard.")) << wrong.number;
+  }
+}
+
 TEST(Metadata, RefusesEveryTruncation) {
   const std::string json = format_metadata(full());
   for (std::size_t size = 0; size < json.size(); ++size) {

@@ -96,8 +96,8 @@ ShardNumber shard_from_string(const std::string& text) {
   if (slash == std::string::npos) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("found \"{}\", must be K/N, as in 3/16", text));
   }
-  return {static_cast<int>(parse_whole_number(text.substr(0, slash), 1, 1000000)),
-          static_cast<int>(parse_whole_number(text.substr(slash + 1), 1, 1000000))};
+  return {static_cast<int>(parse_whole_number(text.substr(0, slash), 1, kMostShards)),
+          static_cast<int>(parse_whole_number(text.substr(slash + 1), 1, kMostShards))};
 }
 
 void check_shard_options(const CommandLine& line, const ConvertCommandOptions& options) {

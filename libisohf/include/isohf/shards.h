@@ -14,6 +14,9 @@
 
 namespace isohf {
 
+/// The most shards of a conversion.
+inline constexpr int kMostShards = 1000000;
+
 /// Shard `number` of `count`, from 1 on.
 struct ShardNumber {
   int number = 1;

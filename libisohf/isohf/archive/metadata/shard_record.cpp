@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "isohf/archive/metadata/json_members.h"
+#include "isohf/shards.h"
 
 namespace isohf {
 
@@ -21,7 +24,11 @@ std::optional<ShardRecord> shard_record(const Metadata& metadata) {
   auto record = read_extension(metadata, kShardName, shard_members);
   if (!record) return record;
   const std::int64_t rows = metadata.grid.tile_rows();
-  if (record->first_row >= record->end_row || record->end_row > rows) {
+  // Memory grows with the number of shards that one of them states.
+  if (record->count > std::min<std::int64_t>(rows, kMostShards)) {
+    refuse_metadata("shard.of", fmt::format("is {}, of {} rows of tiles", record->count, rows));
+  }
+  if (record->first_row < 0 || record->first_row >= record->end_row || record->end_row > rows) {
     refuse_metadata("shard.end_row",
                     fmt::format("makes rows {} to {}, of {} rows of tiles", record->first_row, record->end_row, rows));
   }
