@@ -98,7 +98,7 @@ std::vector<Kind> kinds() {
           {"UnitlessFloats", own + "ridges_161x161_float.exr", {"--type", "f32"}},
           {"Voids", own + "voids_200x150_int16.tif", {}},
           {"Alps", real_data() / "N44E006.hgt", {}},
-          {"Degrees", real_data() / "N44E006.hgt", {"--projection", "none", "--density", "0.2"}},
+          {"Degrees", real_data() / "N44E006.hgt", {"--to-crs", "none", "--density", "0.2"}},
           {"Globe", real_data() / "ETOPO1_1deg.tif", {}},
           {"Mars", real_data() / "megt90n000cb.lbl", {"--density", "0.2"}},
           {"Heightmap", real_data() / "t3d_mountain1.exr", {}}};

@@ -40,7 +40,7 @@ constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
     {"memory_bytes", "--memory"},
     {"overwrite", "--overwrite"},
     {"part", "--part"},
-    {"projection", "--projection"},
+    {"projection", "--to-crs"},
     {"raw", "--raw"},
     {"reference_system", "--crs"},
     {"crs", "--crs"},

@@ -123,7 +123,7 @@ std::optional<ExportOptions> parse_export(const Arguments& arguments) {
               [&](const std::string& text) { options.size = parse_size(text, 1, kMostSide); });
   line.option("--spacing", "LENGTH", "Write samples so far apart: world units, or with a unit as in 30m, 0.5km, 100ft",
               [&](const std::string& text) { options.spacing = parse_length(text); });
-  line.option("--crs", "SYSTEM",
+  line.option("--to-crs", "SYSTEM",
               "Write the raster in this reference system, each sample by its place: EPSG:2154, WKT, a PROJ string, or "
               "a file with one of them (default: the archive's)",
               [&](const std::string& text) { options.system = system_from(text); });
@@ -154,7 +154,7 @@ std::optional<ExportOptions> parse_export(const Arguments& arguments) {
   add_memory_option(line, options.work);
   add_common_options(line, options.common);
   line.footer(kExportFooter);
-  for (const char* option : {"--size", "--spacing", "--crs", "--bbox", "--tile-size"}) {
+  for (const char* option : {"--size", "--spacing", "--to-crs", "--bbox", "--tile-size"}) {
     line.exclusive({"--like", option});
   }
   if (!line.parse(arguments)) return std::nullopt;
@@ -214,7 +214,7 @@ SampleGrid grid_of_other(const ExportOptions& options, const Metadata& metadata)
   return *grid;
 }
 
-/// The grid in --crs over a part of the world, which --bbox gives if it is there; warnings are printed.
+/// The grid in --to-crs over a part of the world, which --bbox gives if it is there; warnings are printed.
 /// Throws Error{kInvalidArgument} for a system that is not understood, --method hex, and a spacing in metres where coordinates are degrees.
 SampleGrid asked_grid_in_system(const ExportOptions& options, ArchiveReader& archive, const WorldBounds& ground,
                                 const std::optional<MapBounds>& box, bool quiet) {
@@ -241,9 +241,10 @@ SampleGrid asked_grid_in_system(const ExportOptions& options, ArchiveReader& arc
     const SampleGrid grid =
         own ? *own : grid_in_system(archive.metadata(), ground, std::move(system), options.size, spacing);
     if (grid.goes_by_places() && options.given_method == RestoreMethod::kHex) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  "--crs: rows of another reference system are no rows of the archive, along which --method hex goes; "
-                  "leave it out, or give --method barycentric");
+      throw Error(
+          ErrorCode::kInvalidArgument,
+          "--to-crs: rows of another reference system are no rows of the archive, along which --method hex goes; "
+          "leave it out, or give --method barycentric");
     }
     if (grid.width <= kMostSide && grid.height <= kMostSide) return grid;
     throw Error(ErrorCode::kInvalidArgument, fmt::format("--spacing makes {} x {} samples, at most {} a side are "

@@ -297,7 +297,7 @@ int run(SampleOptions options) {
     throw Error(ErrorCode::kInvalidArgument,
                 archive.path() +
                     ": is laid out in degrees, along which no shadow has a length; convert its source with "
-                    "--projection auto for --shadow");
+                    "--to-crs auto for --shadow");
   }
   print_warnings(archive.warnings());
   const bool takes_geo = options.reads_degrees || !options.geo_places.empty();

@@ -201,7 +201,7 @@ int run(ShadeCommand options) {
       ground && !metadata.projection && ground->worst_error > MapGround::kTrueEnough) {
     print_warning(
         fmt::format("{}: lengths on its map are {:.4g} times those on the ground, and slopes and shadows are "
-                    "of the map; `convert --projection auto` makes an archive that is true",
+                    "of the map; `convert --to-crs auto` makes an archive that is true",
                     options.archive, ground->mean_scale));
   }
   ShadeOptions& request = options.picture;

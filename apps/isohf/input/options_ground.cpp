@@ -14,7 +14,7 @@ void add_ground_options(CommandLine& line, GroundRequest& request) {
       "auto", "equirectangular", "local", "transverse-mercator", "utm", "lambert-conformal", "polar-stereographic",
       "none"};
   line.group("Ground");
-  line.option("--projection", "KIND",
+  line.option("--to-crs", "KIND",
               "Project degrees to metres, and maps to truer ones: equirectangular, local, transverse-mercator, utm, "
               "lambert-conformal, polar-stereographic, none, or chosen by extent (default: auto of degrees, none of "
               "maps); parameters may "

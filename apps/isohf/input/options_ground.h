@@ -8,7 +8,7 @@
 
 namespace isohf::cli {
 
-/// How a source in degrees is laid out on the ground plane: --projection, --wrap-x.
+/// How a source in degrees is laid out on the ground plane: --to-crs, --wrap-x.
 void add_ground_options(CommandLine& line, GroundRequest& request);
 
 /// --geoid FILE.pgm[:to-ellipsoidal|to-orthometric].

@@ -62,9 +62,9 @@ TEST_F(ExportBox, TakesTheSamplesThatConvertTakesAcrossThe180thMeridian) {
     write_degrees(folder / "across", 200, 150, west, 60.0, 0.01, land);
     for (const std::string box : {"179.5,60.2,-179.7,60.9", "179.5,60.2,180.3,60.9", "-180.5,60.2,-179.7,60.9"}) {
       SCOPED_TRACE(box + " of " + std::to_string(west));
-      convert("across.flt", {"--projection", "equirectangular", "--bbox", box});
+      convert("across.flt", {"--to-crs", "equirectangular", "--bbox", box});
       const json cropped = json::parse(run_isohf({"info", folder / "a.isohf", "--json"}).out).at("metadata");
-      convert("across.flt", {"--projection", "equirectangular"});
+      convert("across.flt", {"--to-crs", "equirectangular"});
       const Raster part = exported(box);
       EXPECT_EQ(part.info.width, 80);
       EXPECT_EQ(part.info.height, 70);
@@ -86,7 +86,7 @@ TEST_F(ExportBox, IsTheSameOnAMapFromWhicheverSideItIsCounted) {
   for (const std::string kind : {"transverse-mercator", "lambert-conformal", "local"}) {
     SCOPED_TRACE(kind);
     write_degrees(folder / "across", 200, 150, 179.0, 60.0, 0.01, land);
-    convert("across.flt", {"--projection", kind});
+    convert("across.flt", {"--to-crs", kind});
     const Raster first = exported("179.5,60.2,-179.7,60.9");
     EXPECT_GT(first.info.width, 40);
     EXPECT_LT(first.info.width, 120);

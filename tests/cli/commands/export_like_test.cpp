@@ -40,8 +40,7 @@ class ExportLike : public testing::Test {
 
   void convert(const std::string& name, const std::string& kind, const std::vector<std::string>& more = {}) const {
     const RunResult result = run_isohf(with_more(
-        {"convert", folder / name, folder / "a.isohf", "--overwrite", "--projection", kind, "--type", "f32", "-q"},
-        more));
+        {"convert", folder / name, folder / "a.isohf", "--overwrite", "--to-crs", kind, "--type", "f32", "-q"}, more));
     ASSERT_EQ(result.exit_code, 0) << result.err;
   }
 
@@ -302,7 +301,7 @@ TEST_F(ExportLike, CrsOfTheArchiveItselfGivesTheSourcesGrid) {
   for (const std::string& kind : {std::string("equirectangular"), std::string("lambert-conformal")}) {
     SCOPED_TRACE(kind);
     convert("wide.flt", kind);
-    ASSERT_EQ(run("own.tif", {"--crs", "EPSG:4326", "-q", "--overwrite"}).exit_code, 0);
+    ASSERT_EQ(run("own.tif", {"--to-crs", "EPSG:4326", "-q", "--overwrite"}).exit_code, 0);
     const Raster own = read_raster(folder / "own.tif");
     const Raster beside = like("wide.flt");
     EXPECT_EQ(own.info.width, 240);
@@ -320,7 +319,7 @@ TEST_F(ExportLike, CrsTakesGroundAcrossThe180thMeridianAndWholeGlobes) {
   write_degrees(folder / "globe", 144, 72, 0.0, -90.0, 2.5, hills);
   convert("fiji.flt", "lambert-conformal");
   const auto in_system = [&](const std::string& system) {
-    const RunResult result = run("there.tif", {"--crs", system, "-q", "--overwrite"});
+    const RunResult result = run("there.tif", {"--to-crs", system, "-q", "--overwrite"});
     EXPECT_EQ(result.exit_code, 0) << system << ": " << result.err;
     return read_raster(folder / "there.tif");
   };

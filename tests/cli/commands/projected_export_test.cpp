@@ -35,7 +35,7 @@ TEST(ProjectedRasters, GdalFindsEverySampleWhereItsElevationBelongs) {
                                    "lambert-conformal", "lambert-conformal:-20,20,9", "polar-stereographic:46"}) {
       if (body == kMars && kind == "utm:32N") continue;  // of the Earth
       const RunResult made = run_isohf(
-          {"convert", folder / "plane.flt", folder / "a.isohf", "--overwrite", "--projection", kind, "--type", "f32"});
+          {"convert", folder / "plane.flt", folder / "a.isohf", "--overwrite", "--to-crs", kind, "--type", "f32"});
       ASSERT_EQ(made.exit_code, 0) << made.err;
       for (const std::vector<std::string>& way :
            {std::vector<std::string>{"export"}, {"export", "--bbox", "8.8,44.7,11.1,47.2"}}) {

@@ -377,7 +377,7 @@ TEST_F(ShadeCommand, TakesDegreesForTheMetresThatTheyAre) {
   for (int i = 0; i < 120 * 120; ++i) text += std::to_string(2000.0 - 5.56 * (i % 120)) + (i % 120 == 119 ? "\n" : " ");
   write_file(folder / "slope.asc", text);
   for (const char* projection : {"none", "auto"}) {
-    ASSERT_EQ(run_isohf({"convert", folder / "slope.asc", folder / "s.isohf", "--crs", "EPSG:4326", "--projection",
+    ASSERT_EQ(run_isohf({"convert", folder / "slope.asc", folder / "s.isohf", "--crs", "EPSG:4326", "--to-crs",
                          projection, "--overwrite", "-q"})
                   .exit_code,
               0);

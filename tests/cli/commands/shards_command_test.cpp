@@ -143,7 +143,7 @@ TEST_F(ShardsCommand, OfAnExtractEverythingIsWhereItWas) {
   write_degrees(folder / "west", 240, 200, 6.0, 44.0, 0.01,
                 [](double longitude, double latitude) { return 900.0 + 400.0 * std::sin(longitude * 9.0) * latitude; });
   for (const char* projection : {"equirectangular", "utm"}) {
-    ASSERT_EQ(run({"convert", "west.flt", "-o", "whole.isohf", "--shape", "28x35", "--projection", projection,
+    ASSERT_EQ(run({"convert", "west.flt", "-o", "whole.isohf", "--shape", "28x35", "--to-crs", projection,
                    "--overwrite", "-q"})
                   .exit_code,
               0);

@@ -117,11 +117,11 @@ TEST_F(VerifyAgainst, TakesTheOptionsOfTheInputFromTheArchive) {
       {"land.flt",
        {{},
         {"--bbox", "5.1,44.1,5.4,44.3"},
-        {"--bbox", "5.1,44.1,5.4,44.3", "--fill", "--projection", "utm"},
+        {"--bbox", "5.1,44.1,5.4,44.3", "--fill", "--to-crs", "utm"},
         {"--geoid", folder / "small.pgm"},
         {"--geoid", folder / "small.pgm:to-orthometric", "--bbox", "5.1,44.1,5.4,44.3"},
-        {"--projection", "none"},
-        {"--projection", "local", "--lossless"},
+        {"--to-crs", "none"},
+        {"--to-crs", "local", "--lossless"},
         {"--nodata", "-9999,510"}}},
       {"globe.flt", {{"--wrap-x"}, {"--wrap-x", "--geoid", folder / "small.pgm"}, {"--bbox=170,-20,-170,20"}}},
       {"tiles",
@@ -197,7 +197,7 @@ TEST_F(VerifyAgainst, WarnsOfARasterWithoutAPlace) {
 
 TEST_F(VerifyAgainst, OfAnExtractOnlyItsOwnGroundIsCompared) {
   const std::string part = folder / "part.isohf";
-  for (const Words& with : std::vector<Words>{{}, {"--projection", "utm"}}) {
+  for (const Words& with : std::vector<Words>{{}, {"--to-crs", "utm"}}) {
     ASSERT_EQ(convert("land.flt", with_more({"--shape", "12x19", "--outside", "void"}, with)).exit_code, 0);
     ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", part, "--tiles", "1:3,1:2", "--overwrite"}).exit_code, 0);
     const Words against = {"verify", part, "--against", folder / "land.flt", "--json"};

@@ -1,4 +1,4 @@
-/// Mosaics, --bbox, --wrap-x, --geoid, --fill and every --projection in one conversion, against the ground they show.
+/// Mosaics, --bbox, --wrap-x, --geoid, --fill and every --to-crs in one conversion, against the ground they show.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -100,7 +100,7 @@ struct Combination {
       words.insert(words.end(), {"--bbox", std::to_string((*box)[0]) + "," + std::to_string((*box)[1]) + "," +
                                                std::to_string((*box)[2]) + "," + std::to_string((*box)[3])});
     }
-    words.insert(words.end(), {"--projection", kind, "--step", step});
+    words.insert(words.end(), {"--to-crs", kind, "--step", step});
     if (fill) words.insert(words.end(), {"--fill", "--fill-distance", "10"});
     words.insert(words.end(), more.begin(), more.end());
     return words;
@@ -297,8 +297,8 @@ TEST_F(GeographicCombinations, LosslessKeepsTheFilesOwnSamplesBehindBoxAndFill) 
             return 3000.0 * std::sin(longitude * kDegree) * std::cos(latitude * kDegree);
           },
           [&](double longitude, double latitude) { return std::hypot(longitude - 22.0, latitude - 11.0) < 9.0; }});
-  const Words options = {"--projection", "equirectangular", "--fill",          "--fill-distance", "10",
-                         "--wrap-x",     "--bbox",          "-180,-50,185,60", "--lossless"};
+  const Words options = {"--to-crs", "equirectangular", "--fill",          "--fill-distance", "10",
+                         "--wrap-x", "--bbox",          "-180,-50,185,60", "--lossless"};
   const RunResult made = run_with({"convert", folder / "pieces", folder / "a.isohf"}, options);
   ASSERT_EQ(made.exit_code, 0) << made.err;
   const RunResult restored = run_isohf({"export", folder / "a.isohf", folder / "a.tif"});

@@ -84,7 +84,7 @@ def worst(path, wanted, middle, axis, reach=1000.0):
 
 
 def projections(isohf, folder):
-    """convert --projection SYSTEM, and what is sampled and exported of it."""
+    """convert --to-crs SYSTEM, and what is sampled and exported of it."""
     middle = (7.2, 46.6)
     for axis in (0, 1):
         source = folder / f"degrees{axis}.tif"
@@ -92,25 +92,25 @@ def projections(isohf, folder):
         for text in ("EPSG:2154", "EPSG:3035", "EPSG:2056", "EPSG:3857", "ESRI:54009",
                      "+proj=tmerc +lat_0=0 +lon_0=7 +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=us-ft"):
             archive = folder / "a.isohf"
-            isohf.must("convert", source, "-o", archive, "--overwrite", "--type", "f32", "--projection", text, "-q")
+            isohf.must("convert", source, "-o", archive, "--overwrite", "--type", "f32", "--to-crs", text, "-q")
             isohf.must("export", archive, folder / "a.tif", "--overwrite", "-q")
             far, count = worst(folder / "a.tif", text, middle, axis)
-            check(far <= NEAR and count > 100, f"--projection {text}: off by {far} m at {count} samples")
+            check(far <= NEAR and count > 100, f"--to-crs {text}: off by {far} m at {count} samples")
             for lon, lat in (middle, (7.21, 46.61), (7.19, 46.592)):
                 at = isohf.must("sample", archive, "--at-lonlat", lon, lat).stdout.split()
                 off = abs(float(at[0]) - plane(lon, lat, middle, axis))
-                check(off <= NEAR, f"--projection {text}: {lon} {lat} is off by {off} m")
+                check(off <= NEAR, f"--to-crs {text}: {lon} {lat} is off by {off} m")
                 isohf.must("shade", archive, "-o", folder / "a.png", "--overwrite", "-q") if lon == 7.21 else None
             isohf.must("verify", archive, "--against", source, "-q")
     results = []
     for threads in (1, 2, 7):
-        isohf.must("convert", folder / "degrees0.tif", "-o", folder / "t.isohf", "--overwrite", "--projection", "EPSG:2056",
+        isohf.must("convert", folder / "degrees0.tif", "-o", folder / "t.isohf", "--overwrite", "--to-crs", "EPSG:2056",
                    "-q", "-j", threads)
         results.append((folder / "t.isohf").read_bytes())
     check(len(set(results)) == 1, "bytes depend on the number of threads")
     for text, why in (("EPSG:4258", "counts degrees and is no map"), ("EPSG:999999", "does not understand"),
                       ("IAU_2015:49910", "cannot be reached"), ("EPSG:5773", "no projected or geographic")):
-        isohf.refuses(why, "convert", folder / "degrees0.tif", "-o", folder / "n.isohf", "--projection", text)
+        isohf.refuses(why, "convert", folder / "degrees0.tif", "-o", folder / "n.isohf", "--to-crs", text)
 
 
 def write_globe(path, west):
@@ -133,7 +133,7 @@ def globes(isohf, folder):
         write_globe(folder / "globe.tif", west)
         for text in ("EPSG:3857", "ESRI:54009"):
             isohf.must("convert", folder / "globe.tif", "-o", folder / "g.isohf", "--overwrite", "--type", "f32", "-q",
-                       "--projection", text)
+                       "--to-crs", text)
             isohf.must("export", folder / "g.isohf", folder / "g.tif", "--overwrite", "-q")
             raster = gdal.Open(str(folder / "g.tif"))
             x0, dx, _, y0, _, dy = raster.GetGeoTransform()
@@ -147,14 +147,14 @@ def globes(isohf, folder):
                         x0 + (column + 0.5) * dx, y0 + (row + 0.5) * dy)
                     off = abs(float(heights[row, column]) - float(turned(*back[:2])))
                     check(off <= 1.0, f"{text} of a globe from {west}: {lon} {lat} is off by {off} m")
-        for options in (["--projection", "none"], ["--projection", "equirectangular"]):
+        for options in (["--to-crs", "none"], ["--to-crs", "equirectangular"]):
             isohf.must("convert", folder / "globe.tif", "-o", folder / "g.isohf", "--overwrite", "-q", *options)
             for lon in (200.5, 100.5):
                 said = isohf.must("sample", folder / "g.isohf", "--at-lonlat", lon, 3, "--with-crs").stdout.split()
                 own = west + (lon - west) % 360.0
                 check(abs(float(said[-2]) - own) < 1e-6, f"--with-crs says {said[-2]} for {own}, from {west} on")
     write(folder / "across.tif", "EPSG:4326", 180.0, 10.0, 30.0, (180.0, 10.0), 0)
-    isohf.refuses("its edge runs through it", "convert", folder / "across.tif", "-o", folder / "n.isohf", "--projection",
+    isohf.refuses("its edge runs through it", "convert", folder / "across.tif", "-o", folder / "n.isohf", "--to-crs",
                   "+proj=moll +datum=WGS84")
 
 
@@ -173,7 +173,7 @@ def planets(isohf, folder):
         raster.GetRasterBand(1).WriteArray(numpy.tile(numpy.arange(60, dtype=numpy.float32) * 0.01, (60, 1)))
         raster = None
         result = isohf.must("convert", folder / "body.tif", "-o", folder / "b.isohf", "--overwrite", "--type", "f32",
-                            "--projection", text)
+                            "--to-crs", text)
         check(("taken for one" in result.stderr) == loses, f"{own} to {text}: {result.stderr}")
         isohf.must("export", folder / "b.isohf", folder / "b.tif", "--overwrite", "-q")
         raster = gdal.Open(str(folder / "b.tif"))
@@ -193,7 +193,7 @@ def heights_of_a_projection(isohf, folder):
                              ("EPSG:32632+5773", "EPSG:3035+3855", False)):
         write(folder / "h.tif", "EPSG:32632", 8.5, 46.5, 30.0, (8.5, 46.5), 0, 40)
         arguments = ("convert", folder / "h.tif", "-o", folder / "h.isohf", "--overwrite", "-q", "--crs", own,
-                     "--projection", text)
+                     "--to-crs", text)
         isohf.must(*arguments) if taken else isohf.refuses("speaks of heights", *arguments)
 
 
@@ -204,11 +204,11 @@ def joined(isohf, folder):
         write(folder / "w.tif", "EPSG:32632", 11.985, 46.6, 30.0, middle, axis)
         write(folder / "e.tif", "EPSG:32633", 12.015, 46.6, 30.0, middle, axis)
         pair = (folder / "w.tif", folder / "e.tif")
-        isohf.refuses("--projection joins them", "convert", *pair, "-o", folder / "n.isohf")
+        isohf.refuses("--to-crs joins them", "convert", *pair, "-o", folder / "n.isohf")
         for text, wanted in (("EPSG:3035", "EPSG:3035"), ("EPSG:32632", "EPSG:32632"), ("utm:33N", "EPSG:32633"),
                              ("auto", None), ("EPSG:3857", "EPSG:3857")):
             archive = folder / "j.isohf"
-            isohf.must("convert", *pair, "-o", archive, "--overwrite", "--type", "f32", "--projection", text, "-q")
+            isohf.must("convert", *pair, "-o", archive, "--overwrite", "--type", "f32", "--to-crs", text, "-q")
             isohf.must("export", archive, folder / "j.tif", "--overwrite", "-q")
             own = gdal.Open(str(folder / "j.tif")).GetProjection()
             far, count = worst(folder / "j.tif", wanted or own, middle, axis, 2400.0)
@@ -219,7 +219,7 @@ def joined(isohf, folder):
                 off = abs(float(at[0]) - plane(lon, 46.6, middle, axis))
                 check(off <= NEAR, f"joined by {text}: {lon} is off by {off} m")
         # Files of the map that they are joined on keep their samples.
-        isohf.must("convert", *pair, "-o", folder / "l.isohf", "--overwrite", "--lossless", "--projection", "EPSG:32632", "-q")
+        isohf.must("convert", *pair, "-o", folder / "l.isohf", "--overwrite", "--lossless", "--to-crs", "EPSG:32632", "-q")
         isohf.must("export", folder / "l.isohf", folder / "l.tif", "--overwrite", "-q")
         whole = gdal.Open(str(folder / "l.tif"))
         west = gdal.Open(str(pair[0]))
@@ -231,7 +231,7 @@ def joined(isohf, folder):
         check(numpy.array_equal(part, west.ReadAsArray(0, 0, 40, SIZE)), "samples on the map itself are not kept")
     results = []
     for threads in (1, 3):
-        isohf.must("convert", *pair, "-o", folder / "t.isohf", "--overwrite", "--projection", "EPSG:3035", "-q", "-j", threads)
+        isohf.must("convert", *pair, "-o", folder / "t.isohf", "--overwrite", "--to-crs", "EPSG:3035", "-q", "-j", threads)
         results.append((folder / "t.isohf").read_bytes())
     check(results[0] == results[1], "bytes of a joined mosaic depend on the number of threads")
 
@@ -245,7 +245,7 @@ def other_parameters(isohf, folder):
         text = FIRST.replace(old, new)
         assert text != FIRST
         write(folder / "other.tif", text, *middle, 30.0, middle, 0, 40)
-        isohf.refuses("--projection joins them", "convert", folder / "first.tif", folder / "other.tif", "-o",
+        isohf.refuses("--to-crs joins them", "convert", folder / "first.tif", folder / "other.tif", "-o",
                       folder / "n.isohf")
         like = isohf.run("export", folder / "first.isohf", folder / "like.tif", "--overwrite", "--like",
                          folder / "other.tif")
@@ -260,26 +260,26 @@ def other_parameters(isohf, folder):
 
 
 def written_elsewhere(isohf, folder):
-    """export --crs."""
+    """export --to-crs."""
     middle = (9.4, 46.8)
     for axis in (0, 1):
         for own in ("EPSG:32632", "EPSG:4326", "EPSG:2056"):
             source = folder / "own.tif"
             write(source, own, *middle, 30.0, middle, axis)
-            for options in ([], ["--projection", "EPSG:3035"]):
+            for options in ([], ["--to-crs", "EPSG:3035"]):
                 isohf.must("convert", source, "-o", folder / "o.isohf", "--overwrite", "--type", "f32", "-q", *options)
                 for text in ("EPSG:4326", "EPSG:3035", "EPSG:21781", "EPSG:3857", "EPSG:25832"):
-                    isohf.must("export", folder / "o.isohf", folder / "o.tif", "--overwrite", "-q", "--crs", text)
+                    isohf.must("export", folder / "o.isohf", folder / "o.tif", "--overwrite", "-q", "--to-crs", text)
                     far, count = worst(folder / "o.tif", text, middle, axis)
                     check(far <= NEAR and count > 100,
-                          f"export of {own} {options} --crs {text}: off by {far} m at {count} samples")
-    isohf.must("export", folder / "o.isohf", folder / "cut.tif", "--overwrite", "-q", "--crs", "EPSG:3857", "--size", "64x64",
+                          f"export of {own} {options} --to-crs {text}: off by {far} m at {count} samples")
+    isohf.must("export", folder / "o.isohf", folder / "cut.tif", "--overwrite", "-q", "--to-crs", "EPSG:3857", "--size", "64x64",
                "--tile-size", "32")
     far, count = worst(folder / "cut_x1_y1.tif", "EPSG:3857", middle, 1)
     check(far <= NEAR and count > 5, f"the South-East tile is off by {far} m at {count} samples")
-    isohf.refuses("hex", "export", folder / "o.isohf", folder / "n.tif", "--crs", "EPSG:3857", "--method", "hex")
-    isohf.refuses("does not understand", "export", folder / "o.isohf", folder / "n.tif", "--crs", "EPSG:999999")
-    isohf.refuses("degrees", "export", folder / "o.isohf", folder / "n.tif", "--crs", "EPSG:4326", "--spacing", "30m")
+    isohf.refuses("hex", "export", folder / "o.isohf", folder / "n.tif", "--to-crs", "EPSG:3857", "--method", "hex")
+    isohf.refuses("does not understand", "export", folder / "o.isohf", folder / "n.tif", "--to-crs", "EPSG:999999")
+    isohf.refuses("degrees", "export", folder / "o.isohf", folder / "n.tif", "--to-crs", "EPSG:4326", "--spacing", "30m")
 
 
 def beside(isohf, folder):
@@ -367,7 +367,7 @@ def turns(isohf, folder):
         for longitude in (180.0, -179.5, 179.5, 0.0, 0.5, -0.5, 90.0, 200.0):
             height = float(isohf.must("sample", folder / "g.isohf", "--at-lonlat", str(longitude), "1").stdout.split()[0])
             check(abs(height - 1000 * math.cos(math.radians(longitude))) < 2, f"{text}: {height} at longitude {longitude}")
-        isohf.refuses("leave one of them out", "convert", folder / "g.tif", "-o", folder / "n.isohf", "--wrap-x", "--projection", "equirectangular")
+        isohf.refuses("leave one of them out", "convert", folder / "g.tif", "-o", folder / "n.isohf", "--wrap-x", "--to-crs", "equirectangular")
     write(folder / "u.tif", "EPSG:32632", 9.0, 46.0, 30.0, (9.0, 46.0), 0, 40)
     isohf.refuses("on a map whose meridians are evenly spaced columns", "convert", folder / "u.tif", "-o", folder / "n.isohf", "--wrap-x")
     write(folder / "p.tif", "EPSG:4087", 9.0, 46.0, 30.0, (9.0, 46.0), 0, 40)
@@ -396,7 +396,7 @@ def same_for_gdal(isohf, folder):
             wanted = gdal.Open(str(path)).GetSpatialRef()
             if wanted is None:
                 continue
-            isohf.must("convert", path, "-o", folder / "s.isohf", "--overwrite", "-q", "--projection", "none", "--lossless")
+            isohf.must("convert", path, "-o", folder / "s.isohf", "--overwrite", "-q", "--to-crs", "none", "--lossless")
             isohf.must("export", folder / "s.isohf", folder / "s.tif", "--overwrite", "-q")
             found = gdal.Open(str(folder / "s.tif")).GetSpatialRef()
             check(found.IsSame(wanted, ["CRITERION=EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS", "IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES"]),
@@ -408,7 +408,7 @@ def same_for_gdal(isohf, folder):
         raster.GetRasterBand(1).SetUnitType(unit)
         raster = None
         for name in ("out.tif", "out.png"):
-            isohf.must("convert", folder / "u.tif", "-o", folder / "u.isohf", "--overwrite", "-q", "--projection", "none")
+            isohf.must("convert", folder / "u.tif", "-o", folder / "u.isohf", "--overwrite", "-q", "--to-crs", "none")
             isohf.must("export", folder / "u.isohf", folder / name, "--overwrite", "-q")
             ours = gdal.Open(str(folder / name))
             found = ours.GetRasterBand(1).GetUnitType()
@@ -416,7 +416,7 @@ def same_for_gdal(isohf, folder):
             check(ours.GetSpatialRef().IsCompound() == system(text).IsCompound(), f"{text} with unit {unit!r} in {name}: heights")
     # A .hgt lies on degrees alone for GDAL, and its heights go on being above EGM96.
     (folder / "N44E006.hgt").write_bytes(numpy.full((1201, 1201), 500, dtype=">i2").tobytes())
-    isohf.must("convert", folder / "N44E006.hgt", "-o", folder / "h.isohf", "-q", "--projection", "none")
+    isohf.must("convert", folder / "N44E006.hgt", "-o", folder / "h.isohf", "-q", "--to-crs", "none")
     isohf.must("export", folder / "h.isohf", folder / "h.tif", "-q")
     check(gdal.Open(str(folder / "h.tif")).GetSpatialRef().GetAuthorityCode(None) == "4326", "a .hgt is no EPSG:4326")
     check("EGM96" in isohf.must("info", folder / "h.tif").stdout, "a .hgt's geoid is lost")
@@ -566,7 +566,7 @@ def beside_samples(isohf, folder):
         (folder / (name + ".aux.xml")).write_text(
             f"<PAMDataset><SRS>{system('EPSG:2154').ExportToWkt()}</SRS><GeoTransform>700000, 25, 0, 6600000, 0, -25"
             "</GeoTransform><PAMRasterBand band='1'><NoDataValue>7</NoDataValue><UnitType>ft</UnitType></PAMRasterBand></PAMDataset>")
-        isohf.must("convert", folder / name, "-o", folder / "s.isohf", "--overwrite", "--lossless", "--projection", "none", "-q", *options)
+        isohf.must("convert", folder / name, "-o", folder / "s.isohf", "--overwrite", "--lossless", "--to-crs", "none", "-q", *options)
         isohf.must("export", folder / "s.isohf", folder / "s.tif", "--overwrite", "-q")
         found = gdal.Open(str(folder / "s.tif"))
         check(found.GetGeoTransform() == (700000.0, 25.0, 0.0, 6600000.0, 0.0, -25.0), f"{name}: {found.GetGeoTransform()}")

@@ -272,7 +272,7 @@ def run(program, *arguments):
 
 def cell_read(isohf, source, archive, restored, kept_source):
     """What becomes of a raster on its way through an archive: a word and a reason."""
-    code, said = run(isohf, "convert", source, archive, "--quiet", "--projection", "none")
+    code, said = run(isohf, "convert", source, archive, "--quiet", "--to-crs", "none")
     if code != 0:
         return "refused", said
     code, warned = run(isohf, "export", archive, restored, "--quiet")
@@ -346,7 +346,7 @@ def placed_from_nowhere(isohf, folder, name):
         side = math.isqrt(name.stat().st_size // 2)
         options = ["--raw", f"{side}x{side}:u16le"]
     archive, written = str(folder / (name.name + ".isohf")), str(folder / f"{name.name}.tif")
-    code, said = run(isohf, "convert", str(name), archive, "--quiet", "--projection", "none", "--overwrite", *options)
+    code, said = run(isohf, "convert", str(name), archive, "--quiet", "--to-crs", "none", "--overwrite", *options)
     if code != 0:
         return None if len(said.splitlines()) == 1 else [said]
     code, said = run(isohf, "export", archive, written, "--quiet", "--overwrite")
@@ -366,7 +366,7 @@ def lost_by_real_files(isohf, folder, names):
             refused.append(name.name) if said is None else without.update({name.name: said})
             continue
         archive = str(folder / (name.name + ".isohf"))
-        code, said = run(isohf, "convert", str(name), archive, "--quiet", "--projection", "none", "--overwrite")
+        code, said = run(isohf, "convert", str(name), archive, "--quiet", "--to-crs", "none", "--overwrite")
         found[name.name] = [said] if code != 0 else []
         for options in ([], ["--method", "hex"]) if code == 0 else ():
             written = str(folder / f"{name.name}_out.tif")

@@ -140,7 +140,7 @@ class Tiles(Program):
     def holds(self, source, tiles, zoom, encoding, *options, side=256, missing_is_void=True):
         """Samples, voids and place of all tiles of a level, as GDAL reads what comes back."""
         archive, raster = self.folder / "a.isohf", self.folder / "a.tif"
-        for arguments in (("convert", source, "-o", archive, "--overwrite", "--lossless", "--projection", "none", "-q",
+        for arguments in (("convert", source, "-o", archive, "--overwrite", "--lossless", "--to-crs", "none", "-q",
                            *options), ("export", archive, raster, "--overwrite", "-q")):
             done = self.run(*arguments)
             if done.returncode != 0:

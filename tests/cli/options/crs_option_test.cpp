@@ -135,7 +135,7 @@ TEST_F(CrsOption, GroundBesideAPoleThatIsALineKeepsItsLongitudes) {
 TEST_F(CrsOption, ExportToTheArchivesOwnSystemAddsNoBorder) {
   ASSERT_EQ(convert("EPSG:32611").err, "");
   ASSERT_EQ(run_isohf({"export", archive_, folder_ / "plain.asc", "--method", "hex", "--quiet"}).err, "");
-  ASSERT_EQ(run_isohf({"export", archive_, folder_ / "own.asc", "--crs", "EPSG:32611", "--quiet"}).err, "");
+  ASSERT_EQ(run_isohf({"export", archive_, folder_ / "own.asc", "--to-crs", "EPSG:32611", "--quiet"}).err, "");
   EXPECT_EQ(read_text(folder_ / "own.asc"), read_text(folder_ / "plain.asc"));
 }
 
@@ -161,10 +161,10 @@ TEST_F(CrsOption, ExportToTheArchivesOwnDegreesAddsNoBorderHoweverTheyAreSpelled
                 "cellsize 0.001");
   write_text(grid_, small);
   for (const Case& of : cases) {
-    ASSERT_EQ(convert(of.own, {"--projection", "transverse-mercator"}).exit_code, 0);
+    ASSERT_EQ(convert(of.own, {"--to-crs", "transverse-mercator"}).exit_code, 0);
     const auto size_in = [&](const std::string& system) {
       const RunResult result =
-          run_isohf({"export", archive_, folder_ / "own.tif", "--crs", system, "--quiet", "--overwrite", "--json"});
+          run_isohf({"export", archive_, folder_ / "own.tif", "--to-crs", system, "--quiet", "--overwrite", "--json"});
       EXPECT_EQ(result.exit_code, 0) << result.err;
       const json said = json::parse(result.out);
       return std::pair(said.at("width").get<int>(), said.at("voids").get<int>());

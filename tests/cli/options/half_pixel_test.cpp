@@ -255,7 +255,7 @@ TEST_F(HalfPixel, HgtTilesLieWhereTheirNameSays) {
   const std::string tile = folder_ / "N10E020.hgt";
   for (const auto registration : {Registration::kArea, Registration::kPoint}) {
     write_ramp(folder_ / "tile.tif", kTile, registration, SampleType::kInt16);
-    convert(folder_ / "tile.tif", "a.isohf", {"--lossless", "--projection", "equirectangular"});
+    convert(folder_ / "tile.tif", "a.isohf", {"--lossless", "--to-crs", "equirectangular"});
     for (const std::string method : {"kept samples", "barycentric"}) {
       SCOPED_TRACE(to_string(registration) + " " + method);
       std::vector<std::string> arguments = {"export", folder_ / "a.isohf", tile, "--overwrite", "-q"};
@@ -265,7 +265,7 @@ TEST_F(HalfPixel, HgtTilesLieWhereTheirNameSays) {
       expect_placed(read_raster(tile), kTile, "point", 0.0);
     }
   }
-  convert(tile, "again.isohf", {"--projection", "equirectangular"});
+  convert(tile, "again.isohf", {"--to-crs", "equirectangular"});
   std::ostringstream places;
   places.precision(17);
   std::vector<double> expected;
@@ -286,7 +286,7 @@ TEST_F(HalfPixel, HgtTilesLieWhereTheirNameSays) {
 
 TEST_F(HalfPixel, HgtTilesAreNotWrittenUnderTheNameOfAnotherPlace) {
   write_ramp(folder_ / "tile.tif", kTile, Registration::kPoint, SampleType::kInt16);
-  convert(folder_ / "tile.tif", "a.isohf", {"--lossless", "--projection", "equirectangular"});
+  convert(folder_ / "tile.tif", "a.isohf", {"--lossless", "--to-crs", "equirectangular"});
   const std::vector<std::string> before = folder_.names();
   for (const char* name : {"N44E006.hgt", "n10e021.hgt", "S10E020.hgt"}) {
     const RunResult refused = run_isohf({"export", folder_ / "a.isohf", folder_ / name, "-q"});
@@ -302,7 +302,7 @@ TEST_F(HalfPixel, GdalFindsEverySampleWhereWeDo) {
     GTEST_SKIP() << "gdal-bin is not installed";
   }
   write_ramp(folder_ / "tile.tif", kTile, Registration::kPoint, SampleType::kInt16);
-  convert(folder_ / "tile.tif", "tile.isohf", {"--lossless", "--projection", "equirectangular"});
+  convert(folder_ / "tile.tif", "tile.isohf", {"--lossless", "--to-crs", "equirectangular"});
   const std::string no_pam = "GDAL_PAM_ENABLED=NO";
   for (const auto registration : {Registration::kArea, Registration::kPoint}) {
     write_ramp(folder_ / "ramp.tif", kOblong, registration, SampleType::kFloat32);

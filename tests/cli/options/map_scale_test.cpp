@@ -112,7 +112,7 @@ TEST_F(MapCommand, WebMercatorIsWarnedOfWithTheFigureAndTheRemedy) {
     EXPECT_THAT(result.out, HasSubstr("map scale    lengths on the input's map are 1.40"));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
     EXPECT_THAT(result.err, HasSubstr("web.tif: lengths on its map are 1.40"));
-    EXPECT_THAT(result.err, HasSubstr("--projection auto lays the surface on a truer map"));
+    EXPECT_THAT(result.err, HasSubstr("--to-crs auto lays the surface on a truer map"));
   }
   EXPECT_THAT(run_isohf({"info", folder / "web.isohf"}).out,
               HasSubstr("map scale    lengths on the input's map are 1.40"));
@@ -136,7 +136,7 @@ TEST_F(MapCommand, JsonAndMetadataHoldTheScaleOfTheEllipsoid) {
 TEST_F(MapCommand, ProjectionAutoGivesTrueLengths) {
   convert("web.tif", "web.isohf");
   EXPECT_NEAR(steepness("web.isohf"), 0.1 / 1.4024, 0.0003);  // too flat
-  const RunResult result = convert("web.tif", "true.isohf", {"--projection", "auto"});
+  const RunResult result = convert("web.tif", "true.isohf", {"--to-crs", "auto"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.err, "");
   EXPECT_THAT(result.out, HasSubstr("projection   lambert-conformal around longitude 6.4995, "));
@@ -153,7 +153,7 @@ TEST_F(MapCommand, EveryKindPassesEveryCheck) {
   for (const std::string kind : {"auto", "local", "transverse-mercator", "utm", "utm:31N", "lambert-conformal:44,45",
                                  "polar-stereographic:45"}) {
     SCOPED_TRACE(kind);
-    const RunResult result = convert("web.tif", "a.isohf", {"--projection", kind});
+    const RunResult result = convert("web.tif", "a.isohf", {"--to-crs", kind});
     ASSERT_EQ(result.exit_code, 0) << result.err;
     const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--against", folder / "web.tif"});
     EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
@@ -162,7 +162,7 @@ TEST_F(MapCommand, EveryKindPassesEveryCheck) {
 }
 
 TEST_F(MapCommand, ProjectedSamplesComeBackBitForBit) {
-  ASSERT_EQ(convert("web.tif", "a.isohf", {"--projection", "auto", "--lossless"}).exit_code, 0);
+  ASSERT_EQ(convert("web.tif", "a.isohf", {"--to-crs", "auto", "--lossless"}).exit_code, 0);
   ASSERT_EQ(run_isohf({"export", folder / "a.isohf", folder / "back.tif"}).exit_code, 0);
   const auto back = open_raster(folder / "back.tif", {});
   const auto first = open_raster(folder / "web.tif", {});
@@ -176,7 +176,7 @@ TEST_F(MapCommand, ProjectedSamplesComeBackBitForBit) {
 }
 
 TEST_F(MapCommand, ProjectionNoneKeepsTheMapWithoutAWarning) {
-  EXPECT_EQ(convert("web.tif", "a.isohf", {"--projection", "none"}).err, "");
+  EXPECT_EQ(convert("web.tif", "a.isohf", {"--to-crs", "none"}).err, "");
   EXPECT_TRUE(info("a.isohf").at("metadata").at("projection").is_null());
 }
 
@@ -185,14 +185,14 @@ TEST_F(MapCommand, MapsThatAreTrueEnoughStayWhatTheyAre) {
   EXPECT_EQ(plain.exit_code, 0);
   EXPECT_EQ(plain.err, "");
   EXPECT_THAT(plain.out, HasSubstr("map scale    lengths on the input's map are 1.000"));
-  EXPECT_EQ(convert("utm.tif", "b.isohf", {"--projection", "auto"}).err, "");
+  EXPECT_EQ(convert("utm.tif", "b.isohf", {"--to-crs", "auto"}).err, "");
   EXPECT_EQ(info("a.isohf").at("metadata"), info("b.isohf").at("metadata"));
 }
 
 TEST_F(MapCommand, EquirectangularIsForDegrees) {
-  const RunResult result = convert("web.tif", "a.isohf", {"--projection", "equirectangular"});
+  const RunResult result = convert("web.tif", "a.isohf", {"--to-crs", "equirectangular"});
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.err, HasSubstr("it is for inputs in degrees, this one is on a map; --projection"));
+  EXPECT_THAT(result.err, HasSubstr("it is for inputs in degrees, this one is on a map; --to-crs"));
 }
 
 TEST_F(MapCommand, InfoSaysWhereASourceLiesInItsOwnCoordinatesAndInDegrees) {
@@ -227,7 +227,7 @@ TEST_F(MapCommand, FeetSurvive) {
 
 TEST_F(MapCommand, SampleTakesAndGivesTheInputsOwnCoordinatesAndDegrees) {
   convert("utm.tif", "a.isohf");
-  ASSERT_EQ(convert("web.tif", "b.isohf", {"--projection", "auto"}).exit_code, 0);
+  ASSERT_EQ(convert("web.tif", "b.isohf", {"--to-crs", "auto"}).exit_code, 0);
   for (const auto& [archive, epsg] :
        {std::pair<std::string, std::string>{"a.isohf", "EPSG:32632"}, {"b.isohf", "EPSG:3857"}}) {
     SCOPED_TRACE(archive);
@@ -263,7 +263,7 @@ TEST_F(MapCommand, SampleTakesAndGivesTheInputsOwnCoordinatesAndDegrees) {
 
 TEST_F(MapCommand, SampleWithoutTheModuleTakesWhatNeedsNone) {
   convert("utm.tif", "a.isohf");
-  ASSERT_EQ(convert("web.tif", "b.isohf", {"--projection", "auto"}).exit_code, 0);
+  ASSERT_EQ(convert("web.tif", "b.isohf", {"--to-crs", "auto"}).exit_code, 0);
   fs::create_directory(folder / "bin");
   const std::string program = folder / "bin/isohf";
   fs::copy_file(isohf_path(), program);
@@ -324,8 +324,7 @@ TEST_F(MapCommand, WithoutTheModuleAllElseWorksAndALineSaysWhatIsMissing) {
   const RunResult said = run_program({program, "info", folder / "a.isohf"});
   EXPECT_EQ(said.err, "");
   EXPECT_THAT(said.out, HasSubstr("lon/lat      not known: reference systems need the PROJ module"));
-  const RunResult asked =
-      run_program({program, "convert", folder / "web.tif", folder / "b.isohf", "--projection", "auto"});
+  const RunResult asked = run_program({program, "convert", folder / "web.tif", folder / "b.isohf", "--to-crs", "auto"});
   EXPECT_EQ(asked.exit_code, 2);
   EXPECT_THAT(asked.err, HasSubstr("needs to know the input's own map: reference systems need the PROJ module"));
   EXPECT_EQ(std::count(asked.err.begin(), asked.err.end(), '\n'), 1);
@@ -342,7 +341,7 @@ TEST_F(MapCommand, WithoutProjsDatabaseALineSaysSo) {
 }
 
 TEST_F(MapCommand, ExportCutsABoxOfTheInputsOwnCoordinatesOutOfAnotherMap) {
-  ASSERT_EQ(convert("web.tif", "a.isohf", {"--projection", "auto"}).exit_code, 0);
+  ASSERT_EQ(convert("web.tif", "a.isohf", {"--to-crs", "auto"}).exit_code, 0);
   const json bounds = info("web.tif").at("bounds");
   const double west = bounds.at("west").get<double>() + 3200.0;
   const double north = bounds.at("north").get<double>() - 3200.0;
@@ -361,8 +360,8 @@ TEST_F(MapCommand, AGlobalMapIsStatedAndKept) {
   const RunResult plan = run_isohf({"plan", file});
   EXPECT_EQ(plan.exit_code, 0);
   EXPECT_THAT(plan.err, HasSubstr("lengths on its map are 2.6"));
-  EXPECT_THAT(plan.err, HasSubstr("a part of it (--bbox) can be laid on a truer map by --projection auto"));
-  const RunResult asked = run_isohf({"plan", file, "--projection", "auto"});
+  EXPECT_THAT(plan.err, HasSubstr("a part of it (--bbox) can be laid on a truer map by --to-crs auto"));
+  const RunResult asked = run_isohf({"plan", file, "--to-crs", "auto"});
   EXPECT_EQ(asked.exit_code, 2);
   EXPECT_THAT(asked.err, HasSubstr("give a part of it"));
 }

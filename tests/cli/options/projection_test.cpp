@@ -71,33 +71,33 @@ TEST_F(ProjectionCommand, PlanConvertAndInfoSayWhatWasTakenWhyAndHowFarLengthsEr
 TEST_F(ProjectionCommand, WhatDoesNotGoTogetherIsRefusedInOneLine) {
   const std::string wide = folder / "wide.flt";
   const std::string out = folder / "b.isohf";
-  refuses({"convert", wide, out, "--projection", "mercator"}, "--projection: found 'mercator', must be one of auto");
-  refuses({"convert", wide, out, "--projection", "polar-stereographic:-60"}, "--projection lambert-conformal works");
+  refuses({"convert", wide, out, "--to-crs", "mercator"}, "--to-crs: found 'mercator', must be one of auto");
+  refuses({"convert", wide, out, "--to-crs", "polar-stereographic:-60"}, "--to-crs lambert-conformal works");
   refuses({"convert", wide, out, "--wrap-x"}, "240 columns 0.05 apart make 12");
   refuses({"convert", wide, out, "--geoid", "egm.tif"}, "must be a geoid's FILE.pgm");
   refuses({"convert", wide, out, "--geoid", folder / "egm.pgm"}, "egm.pgm: no such file", 1);
   refuses({"convert", wide, out, "--geoid", folder / "egm.pgm", "--lossless"}, "give one of the two");
-  converts({"--projection", "utm"});
+  converts({"--to-crs", "utm"});
   write_degrees(folder / "small", 40, 30, 2.0, 42.0, 0.05, land);
   refuses({"verify", folder / "a.isohf", "--against", folder / "small.flt"}, "40x30 samples");
   fs::remove(folder / "wide.prj");
   write_degrees(folder / "metres", 20, 20, 0.0, 0.0, 30.0, land);
   fs::remove(folder / "metres.prj");
-  refuses({"convert", folder / "metres.flt", out, "--projection", "utm"}, "needs an input in degrees");
+  refuses({"convert", folder / "metres.flt", out, "--to-crs", "utm"}, "needs an input in degrees");
 }
 
 TEST_F(ProjectionCommand, LosslessGivesTheInputBackThroughEveryKind) {
   const std::string input = read_file(folder / "wide.flt");
   const std::string plain = [&] {
-    converts({"--projection", "equirectangular", "--lossless"});
+    converts({"--to-crs", "equirectangular", "--lossless"});
     return read_file(folder / "a.isohf");
   }();
   for (const std::string kind :
        {"auto", "local", "transverse-mercator", "utm", "lambert-conformal", "polar-stereographic:45"}) {
     SCOPED_TRACE(kind);
-    converts({"--projection", kind, "--lossless", "-j", "1"});
+    converts({"--to-crs", kind, "--lossless", "-j", "1"});
     const std::string one = read_file(folder / "a.isohf");
-    converts({"--projection", kind, "--lossless", "-j", "3"});
+    converts({"--to-crs", kind, "--lossless", "-j", "3"});
     EXPECT_TRUE(read_file(folder / "a.isohf") == one);
     EXPECT_LT(one.size(), 2 * plain.size());
     EXPECT_EQ(isohf({"verify", folder / "a.isohf"}).exit_code, 0);
@@ -131,7 +131,7 @@ TEST_F(ProjectionCommand, LosslessKeepsVoidsAndGroundBeyondTheMap) {
 }
 
 TEST_F(ProjectionCommand, ShadowsAndPicturesOfAMapAreMade) {
-  converts({"--projection", "transverse-mercator", "--shadow-seeds"});
+  converts({"--to-crs", "transverse-mercator", "--shadow-seeds"});
   ASSERT_EQ(isohf({"shade", folder / "a.isohf", "-o", folder / "a.tif", "--size", "300x200"}).exit_code, 0);
   ASSERT_EQ(isohf({"export", folder / "a.isohf", folder / "b.tif", "--size", "300x200"}).exit_code, 0);
   OpenOptions green;

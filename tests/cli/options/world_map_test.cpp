@@ -38,8 +38,8 @@ TEST(WorldMap, AGlobeIsShownOnceWhereverItsLongitudesBegin) {
     for (const double west : {0.0, -180.0, -100.0}) {
       SCOPED_TRACE(std::string(of.map) + " from " + std::to_string(west));
       write_degrees(folder / "globe", 360, 180, west, -90.0, 1.0, hills);
-      const RunResult made = run_isohf({"convert", folder / "globe.flt", folder / "a.isohf", "--overwrite",
-                                        "--projection", of.map, "--type", "f32"});
+      const RunResult made = run_isohf(
+          {"convert", folder / "globe.flt", folder / "a.isohf", "--overwrite", "--to-crs", of.map, "--type", "f32"});
       ASSERT_EQ(made.exit_code, 0) << made.err;
       const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--against", folder / "globe.flt"});
       EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
@@ -60,8 +60,8 @@ TEST(WorldMap, ARasterAcrossTheCutOfItsOwnMapIsWholeOnAnother) {
   };
   write_gridfloat(folder / "a", 110, 50, 19500000.0, 1000000.0, 10000.0, sample, "");
   std::filesystem::remove(folder / "a.prj");
-  const RunResult made = run_isohf({"convert", folder / "a.flt", folder / "a.isohf", "--crs", "EPSG:4087",
-                                    "--projection", "transverse-mercator", "--type", "f32"});
+  const RunResult made = run_isohf({"convert", folder / "a.flt", folder / "a.isohf", "--crs", "EPSG:4087", "--to-crs",
+                                    "transverse-mercator", "--type", "f32"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--against", folder / "a.flt", "--json"});
   EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;
@@ -76,7 +76,7 @@ TEST(WorldMap, ItsOwnDegreesGiveAllColumnsAndTheBoxThatIsAsked) {
         run_isohf({"convert", folder / "cap.flt", folder / "a.isohf", "--overwrite", "--type", "f32"});
     ASSERT_EQ(made.exit_code, 0) << made.err;
     const RunResult restored =
-        run_isohf({"export", folder / "a.isohf", folder / "a.tif", "--crs", "EPSG:4326", "--overwrite", "-q"});
+        run_isohf({"export", folder / "a.isohf", folder / "a.tif", "--to-crs", "EPSG:4326", "--overwrite", "-q"});
     ASSERT_EQ(restored.exit_code, 0) << restored.err;
     const Raster whole = read_raster(folder / "a.tif");
     EXPECT_EQ(whole.info.width, 360);
@@ -90,7 +90,7 @@ TEST(WorldMap, ItsOwnDegreesGiveAllColumnsAndTheBoxThatIsAsked) {
     for (const Case& of :
          {Case{"170,-80,190,-70", 170.0, 20}, Case{"350,-80,10,-70", 350.0, 20}, Case{"200,-80,250,-70", 200.0, 50}}) {
       SCOPED_TRACE(std::string(of.box) + " of columns from " + std::to_string(west));
-      const RunResult cut = run_isohf({"export", folder / "a.isohf", folder / "b.tif", "--crs", "EPSG:4326",
+      const RunResult cut = run_isohf({"export", folder / "a.isohf", folder / "b.tif", "--to-crs", "EPSG:4326",
                                        std::string("--bbox=") + of.box, "--overwrite", "-q"});
       ASSERT_EQ(cut.exit_code, 0) << cut.err;
       const Raster part = read_raster(folder / "b.tif");
