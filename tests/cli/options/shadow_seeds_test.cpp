@@ -56,7 +56,8 @@ TEST_F(ShadowSeedsOption, IsOffByDefault) {
 }
 
 TEST_F(ShadowSeedsOption, SummarySaysWhatTheyTake) {
-  const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--shadow-seeds"});
+  const RunResult result =
+      run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--shape", "52x67", "--shadow-seeds"});
   EXPECT_THAT(result.out, HasSubstr("\nshadows "));
 }
 

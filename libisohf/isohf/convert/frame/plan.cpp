@@ -75,6 +75,15 @@ double extent_for(const TileShape& shape, const SourceFrame& frame, const PlanRe
   return extent_for_density(shape, frame, request.density.value_or(1.0));
 }
 
+/// Whether one tile of the usual size covers the source, at the density or spacing asked for; globes are cut into tiles
+/// of their own.
+bool fits_one_tile(const SourceFrame& frame, const PlanRequest& request) {
+  if (request.tiles || frame.wraps_x) return false;
+  const TileShape usual = TileShape::nearest(kDefaultColumns, kDefaultRows, request.levels.value_or(kDefaultLevels));
+  const WorldBounds bounds = frame.bounds();
+  return std::max(bounds.x1, bounds.z1) <= extent_for(usual, frame, request);
+}
+
 /// Shape and grid of the tiles.
 struct Lattice {
   TileShape shape;
@@ -146,6 +155,8 @@ std::optional<Lattice> fitted_lattice(const SourceFrame& frame, const PlanReques
                                   (kMaxTileRows - 3) * static_cast<double>(*tile_rows) / wanted_rows});
     wanted_columns *= held;
     wanted_rows *= held;
+  } else if (fits_one_tile(frame, request)) {
+    tile_columns = tile_rows = 1;
   }
   const int most_levels = request.levels.value_or(kDefaultLevels);
   const int fewest_levels = request.levels.value_or(1);
@@ -183,15 +194,20 @@ std::optional<Lattice> fitted_lattice(const SourceFrame& frame, const PlanReques
   return best;
 }
 
-/// Stored samples of the whole dataset with this shape, tile overhead included.
-double cost_of(const TileShape& shape, const SourceFrame& frame, const PlanRequest& request) {
+/// How many tiles of this shape cover the source.
+double tiles_of(const TileShape& shape, const SourceFrame& frame, const PlanRequest& request) {
   const double extent = extent_for(shape, frame, request);
   const WorldBounds bounds = frame.bounds();
-  const double tiles = std::ceil(bounds.x1 / extent - 1e-9) * std::ceil(bounds.z1 / extent - 1e-9);
-  return std::max(tiles, 1.0) * (static_cast<double>(shape.stored_vertex_count()) + kTileOverhead);
+  return std::max(std::ceil(bounds.x1 / extent - 1e-9) * std::ceil(bounds.z1 / extent - 1e-9), 1.0);
+}
+
+/// Stored samples of the whole dataset with this shape, tile overhead included.
+double cost_of(const TileShape& shape, const SourceFrame& frame, const PlanRequest& request) {
+  return tiles_of(shape, frame, request) * (static_cast<double>(shape.stored_vertex_count()) + kTileOverhead);
 }
 
 TileShape shape_for_small_source(const SourceFrame& frame, const PlanRequest& request) {
+  const bool is_one_tile = fits_one_tile(frame, request);
   const int most_levels = request.levels.value_or(kDefaultLevels);
   const int fewest_levels = request.levels.value_or(1);
   std::optional<TileShape> best;
@@ -203,6 +219,7 @@ TileShape shape_for_small_source(const SourceFrame& frame, const PlanRequest& re
       if (!TileShape::why_invalid(cells + 4, rows, levels).empty()) continue;
       const TileShape shape = TileShape::make(cells + 4, rows, levels);
       if (std::abs(shape.aspect() - 1.0) > kWorstAspect) continue;
+      if (is_one_tile && tiles_of(shape, frame, request) > 1.0) continue;
       // Every level given up must save a tenth.
       const double cost = cost_of(shape, frame, request) * std::pow(kLevelWorth, most_levels - levels);
       if (!best || cost < best_cost) {
