@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "formats/georeference/files_beside.h"
@@ -28,29 +29,45 @@ struct HgtCorner {
   int latitude = 0;   ///< -90...90
 };
 
-/// What the name of an SRTM tile says: hemisphere and two digits, hemisphere and three digits, in any case, at its
-/// beginning: "N44E006.hgt", "s35e145.SRTMGL1.hgt.zip". Nothing where it begins in another way. Folders may precede it.
-std::optional<HgtCorner> hgt_corner_of(const std::string& path) {
-  const std::string name = path.substr(path.find_last_of('/') + 1);
-  if (name.size() < 7) return std::nullopt;
-  const auto hemisphere = [&](std::size_t at) {
-    return static_cast<char>(std::tolower(static_cast<unsigned char>(name[at])));
+/// The corner in a word of exactly seven letters: hemisphere and two digits, hemisphere and three digits, in any case.
+std::optional<HgtCorner> corner_in(std::string_view word) {
+  const auto is_one_of = [&](std::size_t at, std::string_view letters) {
+    return letters.find(static_cast<char>(std::tolower(static_cast<unsigned char>(word[at])))) != letters.npos;
   };
   const auto digits = [&](std::size_t begin, std::size_t count) {
     int value = 0;
     for (std::size_t i = begin; i < begin + count; ++i) {
-      if (std::isdigit(static_cast<unsigned char>(name[i])) == 0) return -1;
-      value = value * 10 + (name[i] - '0');
+      if (std::isdigit(static_cast<unsigned char>(word[i])) == 0) return -1;
+      value = value * 10 + (word[i] - '0');
     }
     return value;
   };
-  const char north_south = hemisphere(0);
-  const char east_west = hemisphere(3);
-  if ((north_south != 'n' && north_south != 's') || (east_west != 'e' && east_west != 'w')) return std::nullopt;
+  if (!is_one_of(0, "ns") || !is_one_of(3, "ew")) return std::nullopt;
   const int latitude = digits(1, 2);
   const int longitude = digits(4, 3);
   if (latitude < 0 || latitude > 90 || longitude < 0 || longitude > 180) return std::nullopt;
-  return HgtCorner{east_west == 'w' ? -longitude : longitude, north_south == 's' ? -latitude : latitude};
+  return HgtCorner{is_one_of(3, "w") ? -longitude : longitude, is_one_of(0, "s") ? -latitude : latitude};
+}
+
+/// What the name of an SRTM tile states: "N44E006.hgt", "s35e145.SRTMGL1.hgt.zip", "srtm_n44e006_v3.hgt": the one
+/// place in it that stands between other characters than letters and digits, or at its beginning. nullopt: none, or
+/// several. Directories may precede the name.
+std::optional<HgtCorner> hgt_corner_of(const std::string& path) {
+  const std::string name = path.substr(path.find_last_of('/') + 1);
+  constexpr std::size_t kLength = 7;
+  const auto is_inside_word = [&](std::size_t at) {
+    return at < name.size() && std::isalnum(static_cast<unsigned char>(name[at])) != 0;
+  };
+  if (name.size() < kLength) return std::nullopt;
+  if (const auto first = corner_in(std::string_view(name).substr(0, kLength))) return first;
+  std::optional<HgtCorner> found;
+  for (std::size_t at = 1; at + kLength <= name.size(); ++at) {
+    if (is_inside_word(at - 1) || is_inside_word(at + kLength)) continue;
+    const auto corner = corner_in(std::string_view(name).substr(at, kLength));
+    if (corner && found) return std::nullopt;
+    if (corner) found = corner;
+  }
+  return found;
 }
 
 constexpr std::int64_t kSampleBytes = 2;
@@ -144,7 +161,7 @@ class HgtSource final : public PlainSource {
       geo.origin_y = corner->latitude + 1;
     } else {
       info_.warnings.push_back(
-          loss("the name does not say where the tile lies (N44E006.hgt does); its position is unknown"));
+          loss("the name does not state where the tile lies; its position is unknown: name it as in N44E006.hgt"));
     }
     if (size->rows != 1201 && size->rows != 3601) {
       info_.warnings.push_back(

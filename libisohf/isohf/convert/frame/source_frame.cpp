@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "isohf/error.h"
 #include "isohf/projection/reference_map.h"
@@ -191,6 +192,11 @@ void place_degrees(const SourceInfo& info, const GroundRequest& request, SourceF
   if (choice.spec.kind != ProjectionKind::kEquirectangular) check_latitudes(info);
   frame.in_metres = true;
   frame.projection = ProjectionRecord{choice.spec, {}, choice.error.worst, choice.error.place, choice.why};
+  if (!place.has_origin) {
+    frame.projection->worst_scale_error = std::numeric_limits<double>::infinity();
+    frame.projection->worst_place = {0.0, 90.0};
+    frame.projection->why = "laid out as at the equator, since the input does not state its position";
+  }
   // The middle of the samples, not of the ground, which may have been cut at a pole.
   if (place.has_origin && choice.spec.kind == ProjectionKind::kEquirectangular) {
     frame.projection->spec.latitude_0 = place.origin_y - place.spacing_y * static_cast<double>(info.height - 1) / 2.0;
@@ -302,6 +308,12 @@ SourceFrame make_source_frame(const SourceInfo& info, const GroundRequest& reque
 
 std::string scale_warning(const SourceInfo& info, const SourceFrame& frame, const ProjectionRequest& request) {
   if (frame.projection && !request.system_note.empty()) return request.system_note;
+  if (frame.projection && !info.georeference.has_origin) {
+    return fmt::format(
+        "{}: its degrees are laid out as at the equator, since it does not state its position; lengths "
+        "from West to East are 41 % too large at latitude 45, and 100 % at 60; give the file its position",
+        info.path);
+  }
   const bool is_known = request.is_given && !request.is_auto && request.kind == ProjectionKind::kNone;
   if (!frame.ground || frame.projection || is_known || frame.ground->worst_error <= MapGround::kTrueEnough) return {};
   const MapGround& ground = *frame.ground;
