@@ -9,7 +9,15 @@ install(TARGETS isohf_cli isohf_experiment RUNTIME DESTINATION ${CMAKE_INSTALL_B
 if(TARGET isohf_view)
   install(TARGETS isohf_view RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
 endif()
-# The reader module is installed where it is built: formats/CMakeLists.txt.
+# The reader modules are installed where they are built: formats/CMakeLists.txt.
+
+# Everything that `cmake --install` lays down, and no test: what scripts/quickstart builds.
+add_custom_target(installed DEPENDS isohf isohf_formats isohf_cli isohf_experiment)
+foreach(target IN ITEMS isohf_view isohf_oiio isohf_proj isohf_netcdf)
+  if(TARGET ${target})
+    add_dependencies(installed ${target})
+  endif()
+endforeach()
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/isohf)
 install(EXPORT isohf FILE isohfTargets.cmake NAMESPACE isohf:: DESTINATION ${package_dir} COMPONENT development)
