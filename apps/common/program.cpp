@@ -66,7 +66,8 @@ int run_program(const char* name, int argc, char** argv, int (*body)(const Argum
   // The C library loads what unwinds a stack when it is needed first, and aborts where there is no memory left for that.
   void* frame = nullptr;
   static_cast<void>(::backtrace(&frame, 1));
-  // A closed pipe or a file over its size limit is an error that write() reports, not a reason to die.
+  // A closed pipe or a file over its size limit is an error that write() reports, not a reason to die at once: what is
+  // half written is removed first.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
   const Arguments arguments(argv + (argc > 0 ? 1 : 0), argv + argc);
@@ -74,7 +75,10 @@ int run_program(const char* name, int argc, char** argv, int (*body)(const Argum
   try {
     return body(arguments);
   } catch (const OutputClosed&) {
-    return kExitFailed;
+    // The end that cat and gdalinfo meet. 0 would claim that verify found nothing.
+    std::signal(SIGPIPE, SIG_DFL);
+    std::raise(SIGPIPE);
+    return kExitOutputClosed;  // where the signal is blocked
   } catch (const Error& error) {
     return print_error(error, exit_code_for(error.code()));
   } catch (const std::bad_alloc&) {

@@ -16,6 +16,7 @@ enum ExitCode : int {
   kExitUsage = 2,
   kExitDifferences = 3,  ///< verify or diff found some
   kExitInterrupted = 130,
+  kExitOutputClosed = 141,  ///< as a shell reports SIGPIPE
 };
 
 /// What a program ends with after an error of that code.
@@ -26,8 +27,8 @@ enum ExitCode : int {
 
 /// Buffered writing to standard output, every failure noticed.
 ///
-/// A reader that has gone away (a closed pipe) is no error worth a message: it ends the program with exit code 1 and
-/// nothing said. Any other failure throws Error{kIo}.
+/// A reader that has gone away (a closed pipe) ends the program by SIGPIPE, without a message. Any other failure throws
+/// Error{kIo}.
 class StandardOutput {
  public:
   /// Text that may quote files: control characters but for ends of lines and tabs become blanks, as printable() has it.
@@ -47,7 +48,7 @@ class StandardOutput {
 /// Unicode as well, become blanks.
 [[nodiscard]] std::string printable(std::string text);
 
-/// Thrown where standard output's reader has gone; main() ends quietly.
+/// Thrown where standard output's reader has gone; run_program() ends by SIGPIPE.
 struct OutputClosed {};
 
 /// How this run tells of warnings and errors; one for the process, as its streams are. The options set it.

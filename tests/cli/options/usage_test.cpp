@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <regex>
@@ -132,7 +133,7 @@ TEST(Usage, ReaderThatLeavesIsNoMessage) {
   RunOptions closed;
   closed.close_output = true;
   const RunResult result = run_isohf({"plan"}, closed);
-  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.exit_code, 128 + SIGPIPE);
   EXPECT_EQ(result.err, "");
 }
 
