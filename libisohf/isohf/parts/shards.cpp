@@ -126,6 +126,7 @@ std::vector<std::optional<CheckedShard>> check_shards(const std::vector<std::str
   job.throw_if_cancelled();
   std::vector<std::optional<CheckedShard>> shards;
   const CheckedShard* first = nullptr;
+  bool has_strangers = std::ranges::none_of(checked, [](const auto& shard) { return shard.has_value(); });
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (failed[i]) problems.add(*failed[i]);
     if (!checked[i]) continue;
@@ -136,6 +137,7 @@ std::vector<std::optional<CheckedShard>> check_shards(const std::vector<std::str
     }
     if (record.job != first->record.job) {
       problems.add(fmt::format("{}: is a shard of another conversion than {}", files[i], first->path));
+      has_strangers = true;
       continue;
     }
     if (record.count != first->record.count) {
@@ -147,6 +149,8 @@ std::vector<std::optional<CheckedShard>> check_shards(const std::vector<std::str
     if (place) problems.add(fmt::format("{}: is shard {}, as {} is", files[i], record.number, place->path));
     if (!place) place = checked[i];
   }
+  if (has_strangers)
+    problems.set_remedy("merge joins the shards of one conversion; convert the rasters together instead");
   return shards;
 }
 
