@@ -95,13 +95,15 @@ ordered_json document_of(const DiffCommand& options, const ArchiveDifference& fo
 std::string text_from(const DiffCommand& options, const ArchiveDifference& found) {
   std::string text;
   const auto say = [&](const char* what, const std::string& value) { text += fmt::format("{:<12} {}\n", what, value); };
+  if (!found.why_other_lattice.empty()) {
+    say("lattice", fmt::format("{} {}", options.archives[1], found.why_other_lattice));
+    say("metadata", fmt::format("{} members differ; --json prints them",
+                                describe_count(static_cast<std::int64_t>(found.metadata.size()))));
+    return text;
+  }
   for (const auto& member : found.metadata) {
     const auto shown = [](const std::string& value) { return value.empty() ? "nothing" : value; };
     say("metadata", fmt::format("{}: {}, then {}", member.name, shown(member.first), shown(member.second)));
-  }
-  if (!found.why_other_lattice.empty()) {
-    say("lattice", fmt::format("{} {}", options.archives[1], found.why_other_lattice));
-    return text;
   }
   say("tiles",
       fmt::format("{} alike, {} differ{}", describe_count(found.tiles_same), describe_count(found.tiles_differing),
