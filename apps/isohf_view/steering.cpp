@@ -11,6 +11,7 @@ constexpr double kTurn_rad = 2.5;    ///< by a drag as long as the picture is hi
 constexpr double kFlight_s = 0.45;   ///< that going somewhere takes
 constexpr double kLevelSine = 0.12;  ///< below that the ground is seen too flat to be dragged along its plane
 constexpr int kRowsSearched = 24;    ///< of the picture, below a cursor in the sky
+constexpr int kHalvings = 16;        ///< of a turn that the ground ends
 constexpr double kMostSteps = 64.0;  ///< of a frame of flight
 constexpr double kClearance_m = 1.5;
 constexpr double kClearanceSteps = 0.1;  ///< lattice steps, where the unit is not known
@@ -56,25 +57,28 @@ std::optional<Vec3> Steering::middle() {
   return at && at->y < view_.height ? std::optional(there) : std::nullopt;
 }
 
-std::optional<double> Steering::ground_under_eye() {
-  const WorldPoint at{camera_.eye.x, camera_.eye.z};
+/// Beside the data the ground continues at the height of its edge, so that nobody sees it from below.
+double Steering::ground_under_eye() {
+  const WorldBounds covered = source_.covered();
+  const WorldPoint at{std::clamp(camera_.eye.x, covered.x0, covered.x1),
+                      std::clamp(camera_.eye.z, covered.z0, covered.z1)};
+  const double lowest = ground_.whole().low * view_.exaggeration;
   const auto highest = ground_.highest(at);
-  if (!highest) return std::nullopt;
+  if (!highest) return lowest;
   // High above the tile nothing needs decoding.
   if (camera_.eye.y > *highest * view_.exaggeration + 4.0 * source_.grid().extent_x()) {
     return *highest * view_.exaggeration;
   }
   const auto height = ground_.height(at);
-  return height ? std::optional(*height * view_.exaggeration) : std::nullopt;
+  return height ? *height * view_.exaggeration : lowest;
 }
 
 double Steering::height_above_ground() {
-  const double ground = ground_under_eye().value_or(ground_.whole().low * view_.exaggeration);
-  return std::max(camera_.eye.y - ground, clearance_);
+  return std::max(camera_.eye.y - ground_under_eye(), clearance_);
 }
 
 void Steering::stay_above() {
-  if (const auto ground = ground_under_eye()) camera_.eye.y = std::max(camera_.eye.y, *ground + clearance_);
+  camera_.eye.y = std::max(camera_.eye.y, ground_under_eye() + clearance_);
 }
 
 void Steering::press(Drag kind, PicturePoint at) {
@@ -92,15 +96,27 @@ void Steering::move(PicturePoint at) {
   if (drag_->kind == Drag::kPan) {
     pan(at);
   } else {
-    const Camera before = camera_;
-    camera_.orbit(drag_->ground, -dx, -dy);
-    const auto ground = ground_under_eye();
-    if (ground && camera_.eye.y < *ground + clearance_) {
-      camera_ = before;
-      camera_.orbit(drag_->ground, -dx, 0.0);
-    }
+    orbit(-dx, -dy);
   }
   stay_above();
+}
+
+void Steering::orbit(double heading_change_rad, double pitch_change_rad) {
+  const Camera before = camera_;
+  const double most = std::min(pitch_change_rad, std::max(-before.pitch_rad, 0.0));
+  const auto is_free_after = [&](double share) {
+    camera_ = before;
+    camera_.orbit(drag_->ground, heading_change_rad, share * most);
+    return camera_.eye.y >= ground_under_eye() + clearance_;
+  };
+  if (is_free_after(1.0)) return;
+  double free = 0.0;
+  double blocked = 1.0;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double share = 0.5 * (free + blocked);
+    (is_free_after(share) ? free : blocked) = share;
+  }
+  static_cast<void>(is_free_after(free));
 }
 
 void Steering::pan(PicturePoint at) {

@@ -8,7 +8,7 @@
 namespace isohf::view {
 
 /// What a hand on mouse and keys does to a camera: the ground sticks to the cursor, the wheel never passes what is under
-/// it, and the eye stays above ground. Knows nothing of windows.
+/// it, a turn ends at the horizon, and the eye stays above ground. Knows nothing of windows.
 class Steering {
  public:
   /// All three outlive it; `view` says how large the picture is and how high heights are drawn.
@@ -39,7 +39,7 @@ class Steering {
   /// Where lengths are those of the scale bar: the ground in the middle of the picture, else nearest below it; nullopt where
   /// none is in sight.
   [[nodiscard]] std::optional<Vec3> middle();
-  /// Height of the eye above the ground under it; above the lowest ground where there is none.
+  /// Height of the eye above the ground under it, or the edge nearest to it; above the lowest ground in voids.
   [[nodiscard]] double height_above_ground();
   /// What the eye keeps from the ground.
   [[nodiscard]] double clearance() const { return clearance_; }
@@ -58,8 +58,9 @@ class Steering {
     double share;
   };
   [[nodiscard]] Vec3 ray(PicturePoint at) const;
-  [[nodiscard]] std::optional<double> ground_under_eye();
+  [[nodiscard]] double ground_under_eye();
   void pan(PicturePoint at);
+  void orbit(double heading_change_rad, double pitch_change_rad);
   void stay_above();
 
   const TileSource& source_;

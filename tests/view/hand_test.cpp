@@ -80,6 +80,22 @@ TEST_P(Hand, DragsKeepThePickedPointUnderTheCursor) {
   }
 }
 
+TEST_P(Hand, TurnsNeverLookAtTheGroundFromBelow) {
+  for (const double x : {0.05, 0.5, 0.95}) {
+    for (const double y : {0.05, 0.5, 0.95}) {
+      HandScene it = scene();
+      for (int drag = 0; drag < 8; ++drag) {
+        const PicturePoint at{x * it.state.width, y * it.state.height};
+        it.hand.press(Steering::Drag::kOrbit, at);
+        it.hand.move({at.x + 40.0, at.y - 100.0});
+        ASSERT_LE(it.camera.pitch_rad, 1e-12) << x << " " << y << " drag " << drag;
+        ASSERT_GE(it.height(), it.hand.clearance() * 0.999) << x << " " << y << " drag " << drag;
+        ASSERT_GE(it.camera.eye.y, it.ground.whole().low * it.state.exaggeration) << x << " " << y << " drag " << drag;
+      }
+    }
+  }
+}
+
 TEST_P(Hand, HalfAMinuteAheadNeverEntersTheGround) {
   HandScene it = scene();
   const auto middle = it.hand.hold({0.5 * it.state.width, 0.5 * it.state.height});

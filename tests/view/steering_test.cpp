@@ -140,6 +140,39 @@ TEST(Steering, TurningKeepsTheGroundUnderTheCursorWhereItIs) {
   EXPECT_LT(std::remainder(scene.camera.heading_rad - heading, 6.283185307179586), 0.0);
 }
 
+TEST(Steering, ATurnEndsAtTheHorizonAndAboveTheGround) {
+  for (const double x : {60.0, 640.0, 1200.0}) {
+    for (const double y : {80.0, 360.0, 700.0}) {
+      for (const double step : {5.0, 100.0, 400.0}) {
+        Scene scene;
+        const double lowest = scene.ground.whole().low * scene.state.exaggeration;
+        for (double moved = 0.0; moved < 1200.0; moved += step) {
+          scene.hand.press(Steering::Drag::kOrbit, {x, y});
+          scene.hand.move({x + 0.3 * step, y - step});
+          scene.hand.release();
+          ASSERT_LE(scene.camera.pitch_rad, 1e-12) << x << " " << y << " " << moved;
+          ASSERT_GE(scene.camera.eye.y, lowest + scene.hand.clearance()) << x << " " << y << " " << moved;
+          ASSERT_GE(scene.height(), scene.hand.clearance() * 0.999) << x << " " << y << " " << moved;
+        }
+        // It went as far as it may.
+        const bool is_low = scene.hand.height_above_ground() < 1.1 * scene.hand.clearance();
+        EXPECT_TRUE(scene.camera.pitch_rad > -1e-9 || is_low) << x << " " << y << " " << scene.camera.pitch_rad;
+      }
+    }
+  }
+}
+
+TEST(Steering, ADragUpFromBelowTheHorizonGoesBackTheSameWay) {
+  Scene scene;
+  const double pitch = scene.camera.pitch_rad;
+  const PicturePoint at{640.0, 420.0};
+  scene.hand.press(Steering::Drag::kOrbit, at);
+  scene.hand.move({at.x, at.y - 60.0});
+  EXPECT_GT(scene.camera.pitch_rad, pitch);
+  scene.hand.move(at);
+  EXPECT_NEAR(scene.camera.pitch_rad, pitch, 1e-12);
+}
+
 TEST(Steering, SpeedFollowsTheHeightAboveGround) {
   const auto way_from = [](double height) {
     Scene scene;
