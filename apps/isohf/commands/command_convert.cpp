@@ -219,6 +219,21 @@ ordered_json json_of_complete(const std::string& input, const std::string& outpu
           {"archive_bytes", std::filesystem::file_size(output)}};
 }
 
+/// Makes the folders of all archives, and looks whether they can be written to, once for each.
+void make_folders(const std::vector<EachFile>& files) {
+  std::set<std::filesystem::path> folders;
+  for (const EachFile& file : files) folders.insert(std::filesystem::path(file.output).parent_path());
+  for (const std::filesystem::path& folder : folders) {
+    std::error_code none;
+    std::error_code failure;
+    std::filesystem::create_directories(folder, failure);
+    if (failure && !std::filesystem::exists(folder, none)) {
+      throw Error(ErrorCode::kIo, fmt::format("cannot make the folder {}: {}", folder.string(), failure.message()));
+    }
+    require_writable_folder(folder.string());
+  }
+}
+
 /// The files of --each, their archives where they may be written.
 std::vector<EachFile> checked_files(const ConvertCommandOptions& options) {
   std::vector<EachFile> files = files_of_each(options.inputs.names, options.inputs.recursive, options.each.folder);
@@ -240,6 +255,7 @@ std::vector<EachFile> checked_files(const ConvertCommandOptions& options) {
                 {existing, count == 1 ? "exists" : fmt::format("exists, and {} more archives do", count - 1), "",
                  "--resume leaves those that are complete, --overwrite replaces them"});
   }
+  make_folders(files);
   return files;
 }
 
@@ -251,16 +267,6 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
   options.work.threads = share.threads;
   options.work.memory_bytes = share.memory_bytes;
   share_memory(options);
-  const std::filesystem::path output(file.output);
-  std::error_code none;
-  std::error_code failure;
-  std::filesystem::create_directories(output.parent_path(), failure);
-  if (failure && !std::filesystem::exists(output.parent_path(), none)) {
-    throw Error(
-        ErrorCode::kIo,
-        {file.output, fmt::format("cannot make the folder {}: {}", output.parent_path().string(), failure.message()),
-         "", ""});
-  }
   check_archive_output({file.input}, file.output, options.convert.overwrite || options.convert.resume);
   const Prepared prepared = prepare(options, {file.input});
   const SourceInfo& info = prepared.source->info();

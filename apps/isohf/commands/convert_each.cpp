@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <condition_variable>
 #include <exception>
@@ -41,11 +42,12 @@ std::string archive_name(const std::string& input) {
   return ((ending == ".gz" || ending == ".zip") && has_raster_name(bare.string()) ? bare.stem() : bare).string();
 }
 
-/// Whether there was no room for an archive: nor is there for the next one.
+/// Whether the disk takes no archive any more: nor will it take the next one.
 bool is_disk_full(const EachFile& file, const Error& error) {
   const std::string what = error.what();
   return error.code() == ErrorCode::kIo && what.starts_with(file.output) &&
-         (what.find(reason(ENOSPC)) != std::string::npos || what.find(reason(EDQUOT)) != std::string::npos);
+         std::ranges::any_of(std::array{ENOSPC, EDQUOT, EROFS},
+                             [&](int code) { return what.find(reason(code)) != std::string::npos; });
 }
 
 /// Lets many in side by side, or one alone, who need not wait for more than those that are in.
@@ -137,7 +139,6 @@ class Batch {
       add(failed_.size(), "failed");
       add(files_.size() - begun, "not done");
       out_.write(text + " in " + describe_seconds(seconds) + "\n");
-      for (const Error& error : failed_) out_.write(std::string("failed: ") + error.what() + "\n");
     }
     out_.finish();
     if (interrupted_) {

@@ -23,14 +23,6 @@ constexpr std::uint64_t kWritebackBytes = std::uint64_t{4} << 20U;
   throw Error(ErrorCode::kInvalidArgument, why);
 }
 
-void check_folder(const std::string& folder) {
-  struct stat status {};
-  const bool found = ::stat(folder.c_str(), &status) == 0;
-  if (found && !S_ISDIR(status.st_mode)) throw Error(ErrorCode::kIo, folder + " is no folder");
-  if (found && ::access(folder.c_str(), W_OK | X_OK) == 0) return;
-  throw Error(ErrorCode::kIo, fmt::format("cannot write into folder {}: {}", folder, reason(errno)));
-}
-
 /// Opens and locks a file, again where it was renamed between the two.
 File open_locked(const std::string& path) {
   for (int attempt = 0; attempt < 8; ++attempt) {
@@ -59,6 +51,14 @@ std::vector<std::byte> room_for(std::size_t bytes) {
 
 }  // namespace
 
+void require_writable_folder(const std::string& folder) {
+  struct stat status {};
+  const bool found = ::stat(folder.c_str(), &status) == 0;
+  if (found && !S_ISDIR(status.st_mode)) throw Error(ErrorCode::kIo, folder + " is no folder");
+  if (found && ::access(folder.c_str(), W_OK | X_OK) == 0) return;
+  throw Error(ErrorCode::kIo, fmt::format("cannot write into folder {}: {}", folder, reason(errno)));
+}
+
 std::string output_place(const std::string& path, bool overwrite) {
   if (path == "-") {
     refuse(
@@ -68,11 +68,11 @@ std::string output_place(const std::string& path, bool overwrite) {
   struct stat status {};
   if (::lstat(path.c_str(), &status) != 0) {
     if (errno != ENOENT) {
-      if (errno == ENOTDIR) check_folder(folder_of(path));
+      if (errno == ENOTDIR) require_writable_folder(folder_of(path));
       throw Error(ErrorCode::kIo, fmt::format("cannot be looked at: {}", reason(errno)));
     }
     if (path.empty() || path.back() == '/') refuse("names a folder, the output must be a file name");
-    check_folder(folder_of(path));
+    require_writable_folder(folder_of(path));
     return path;
   }
   std::string place = path;
@@ -89,7 +89,7 @@ std::string output_place(const std::string& path, bool overwrite) {
   if (S_ISDIR(status.st_mode)) refuse("is a folder, the output must be a file name");
   if (!S_ISREG(status.st_mode)) refuse("is no regular file, the output must be one");
   if (!overwrite) throw Error(ErrorCode::kInvalidArgument, {"", "exists", "", "`overwrite` replaces it"});
-  check_folder(folder_of(place));
+  require_writable_folder(folder_of(place));
   return place;
 }
 

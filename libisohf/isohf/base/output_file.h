@@ -18,6 +18,9 @@ namespace isohf {
 /// link to nothing; a file that exists, without `overwrite`; Error{kIo}: its folder is missing or may not be written.
 [[nodiscard]] std::string output_place(const std::string& path, bool overwrite);
 
+/// Throws Error{kIo} if `folder` is missing, not a folder, or not writable.
+void require_writable_folder(const std::string& folder);
+
 /// Looks, before any work, whether an output has room that takes so many bytes at least. Throws, without the path,
 /// Error{kIo} where its file system has less; what NAME.part takes already counts as free, and what cannot be told as
 /// enough.
