@@ -203,7 +203,7 @@ void print_warning(const Warning& warning) {
 ordered_json json_from(const Error& error, int exit_code) {
   // In the order of ErrorCode.
   static constexpr std::array kCodes = {"invalid-argument", "io",        "unsupported", "corrupt",
-                                        "out-of-memory",    "cancelled", "warning"};
+                                        "out-of-memory",    "cancelled", "warning",     "no-elevation"};
   ordered_json json = {
       {"code", kCodes.at(static_cast<std::size_t>(error.code()))}, {"exit_code", exit_code}, {"message", error.what()}};
   const ErrorParts parts = error.parts();

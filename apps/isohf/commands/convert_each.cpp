@@ -93,9 +93,8 @@ class Batch {
 
   void finished(std::size_t number, Outcome outcome) {
     const std::lock_guard lock(mutex_);
-    const bool failed = !std::holds_alternative<EachResult>(outcome);
-    if (failed && !options_.keep_going) stopped_ = true;
     if (const auto* error = std::get_if<Error>(&outcome); error != nullptr) {
+      if (!options_.keep_going && error->code() != ErrorCode::kNoElevation) stopped_ = true;
       if (error->code() == ErrorCode::kCancelled) stopped_ = interrupted_ = true;
       if (is_disk_full(files_[number], *error)) stopped_ = true;
     }
@@ -119,13 +118,14 @@ class Batch {
   int finish() {
     if (fault_) std::rethrow_exception(fault_);
     display_.clear();
-    const std::size_t begun = converted_ + complete_ + failed_.size();
+    const std::size_t begun = converted_ + complete_ + empty_ + failed_.size();
     const double seconds = std::chrono::duration<double>(Clock::now() - started_).count();
     if (common_.json) {
       out_.write(json_line({{"summary",
                              {{"files", files_.size()},
                               {"converted", converted_},
                               {"complete", complete_},
+                              {"nodata", empty_},
                               {"failed", failed_.size()},
                               {"not_done", files_.size() - begun},
                               {"seconds", seconds}}}}));
@@ -136,6 +136,7 @@ class Batch {
         if (count > 0) text += fmt::format(", {} {}", number(count), what);
       };
       add(complete_, "complete before");
+      add(empty_, "of nodata alone");
       add(failed_.size(), "failed");
       add(files_.size() - begun, "not done");
       out_.write(text + " in " + describe_seconds(seconds) + "\n");
@@ -162,8 +163,12 @@ class Batch {
         print_warning(names_it ? warning : warning.reworded(file.input + ": " + warning));
       }
       document.update(ordered_json::parse(result->document));
+    } else if (const Error& error = std::get<Error>(outcome); error.code() == ErrorCode::kNoElevation) {
+      ++empty_;
+      display_.clear();
+      if (!common_.quiet) print_note(error.what());
+      document["status"] = "nodata";
     } else {
-      const Error& error = std::get<Error>(outcome);
       if (error.code() == ErrorCode::kCancelled) return;
       // Those that were being made beside the first one that found no room are told of by its line.
       const bool is_full = is_disk_full(file, error);
@@ -192,6 +197,7 @@ class Batch {
   std::map<std::size_t, Outcome> waiting_;  ///< for those before them
   std::size_t converted_ = 0;
   std::size_t complete_ = 0;
+  std::size_t empty_ = 0;  ///< of nodata alone
   std::vector<Error> failed_;
   bool stopped_ = false;
   bool interrupted_ = false;

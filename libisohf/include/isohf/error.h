@@ -19,6 +19,7 @@ enum class ErrorCode {
   kOutOfMemory,      ///< an allocation failed or would exceed the stated bound
   kCancelled,        ///< the caller asked to stop
   kWarning,          ///< a warning, where the caller asked for none
+  kNoElevation,      ///< every sample is nodata
 };
 
 /// An error in parts, for programs that read it; empty where not known. A setting goes by its name ("filter"), not by

@@ -275,7 +275,7 @@ void check_statistics(const Conversion& conversion, const TileStatistics& all, b
   const std::string& path = conversion.source.info().path;
   const ConvertOptions& options = conversion.options;
   if (all.voids == all.vertices && !may_be_void) {
-    throw Error(ErrorCode::kUnsupported,
+    throw Error(ErrorCode::kNoElevation,
                 fmt::format("{}: every one of the {} lattice vertices is void, nothing to write", path, all.vertices));
   }
   const double worst = all.worst_rounding + conversion.height_error;

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -154,6 +155,35 @@ TEST_F(ConvertEach, StopsAtABadFileOrKeepsGoing) {
   EXPECT_EQ(lines[1].at("error").at("where"), in_ + "/b.asc");
   EXPECT_EQ(lines[6].at("summary").at("failed"), 1);
   EXPECT_EQ(archives().size(), 5U);
+}
+
+TEST_F(ConvertEach, GoesOnPastAFileOfNodata) {
+  write_text(in_ + "/b.asc", "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\nNODATA_value -9\n-9 -9\n-9 -9\n");
+  const RunResult result = each({"--json", "-j", "1"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_THAT(result.err, testing::StartsWith("isohf: " + in_ + "/b.asc: all 4 samples"));
+  const std::vector<json> lines = lines_of(result.out);
+  ASSERT_EQ(lines.size(), 7U);
+  EXPECT_EQ(lines[1].at("status"), "nodata");
+  EXPECT_EQ(lines[6].at("summary").at("nodata"), 1);
+  EXPECT_EQ(lines[6].at("summary").at("converted"), 5);
+  EXPECT_EQ(archives().size(), 5U);
+  EXPECT_THAT(each({"--resume", "-q"}).err, "");
+  EXPECT_THAT(run_isohf({"convert", in_ + "/b.asc", folder_ / "b.isohf"}).exit_code, 1);
+}
+
+TEST_F(ConvertEach, TellsOnceOfAFolderThatMayNotBeWrittenTo) {
+  fs::create_directories(out_);
+  ASSERT_EQ(::chmod(out_.c_str(), 0555), 0);
+  ASSERT_EQ(::chmod(folder_.path().c_str(), 0755), 0);
+  RunOptions plain_user;
+  plain_user.without_privileges = true;
+  if (run_isohf({"--version"}, plain_user).exit_code != 0) GTEST_SKIP() << "other users cannot run the program";
+  const RunResult result = run_isohf({"convert", "--each", in_, "--out-dir", out_, "--keep-going"}, plain_user);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.out, "");
+  EXPECT_EQ(result.err, "isohf: cannot write into folder " + out_ + ": Permission denied\n");
 }
 
 TEST_F(ConvertEach, AnInterruptLeavesWhatResumeGoesOnWith) {

@@ -161,7 +161,7 @@ void choose_codes(Conversion& conversion, ConvertSummary& summary) {
     summary.warnings.push_back(info.path + ": " + warning);
   summary.source_voids = found.voids;
   if (found.valid == 0) {
-    throw Error(ErrorCode::kUnsupported,
+    throw Error(ErrorCode::kNoElevation,
                 fmt::format("{}: all {} samples are void or not finite, there is no elevation to convert", info.path,
                             found.voids));
   }
