@@ -264,6 +264,47 @@ TEST_F(Resume, RefusesThePartOfAnotherJob) {
   EXPECT_EQ(go_on(), 5);
 }
 
+TEST_F(Resume, ARunThatStartsOverKeepsAnInterruptedOneUntilItIsComplete) {
+  stop_at(15);
+  stop_at(3);
+  EXPECT_THAT(folder_.names(), ElementsAre("a.part", "a.part.journal", "a.part.old", "a.part.old.journal", "whole"));
+  stop_at(4);  // the larger of the two stays
+  EXPECT_EQ(go_on(), 15);
+  // A larger one of this run, and one of another job.
+  stop_at(5);
+  stop_at(12);
+  EXPECT_EQ(go_on(), 12);
+  stop_at(5);
+  {
+    ArchiveWriter writer(folder_ / "a", grid_, {true, false, "other", kPlanes});
+    add_tiles(writer, grid_, 3);
+    writer.keep_part();
+  }
+  EXPECT_EQ(go_on(), 5);
+}
+
+TEST_F(Resume, ARunThatFailsLeavesAnInterruptedOne) {
+  stop_at(9);
+  {
+    ArchiveWriter writer(folder_ / "a", grid_, {true, false, "job", kPlanes});
+    add_tiles(writer, grid_, 2);
+  }
+  EXPECT_THAT(folder_.names(), ElementsAre("a.part.old", "a.part.old.journal", "whole"));
+  EXPECT_EQ(go_on(), 9);
+}
+
+TEST_F(Resume, FindsTheJournalOfARunThatWasBeingPutAside) {
+  for (const bool back : {false, true}) {
+    stop_at(9);
+    std::filesystem::rename(journal(), part() + ".old.journal");
+    if (back) {
+      std::filesystem::rename(part(), part() + ".old");
+      std::filesystem::rename(part() + ".old.journal", journal());
+    }
+    EXPECT_EQ(go_on(), 9);
+  }
+}
+
 TEST_F(Resume, DropsAnOldPartWithoutBeingAsked) {
   stop_at(5);
   {

@@ -25,6 +25,7 @@
 #include "input/source_size.h"
 #include "interrupt.h"
 #include "isohf/archive.h"
+#include "isohf/archive/journal.h"
 #include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/base/file.h"
 #include "isohf/base/output_file.h"
@@ -162,21 +163,16 @@ std::string incomplete(const std::string& path, const Error& error) {
   return "is no complete archive: " + (why.starts_with(path + ": ") ? why.substr(path.size() + 2) : why);
 }
 
-/// What a run throws away that does not resume: how much an interrupted one left. Empty where there is nothing, or
-/// another run is writing it.
-std::string note_of_dropped_part(const ConvertCommandOptions& options) {
+/// A note of an interrupted run that this one does not resume. Empty where there is none, or another run is writing it.
+std::string note_of_interrupted_run(const ConvertCommandOptions& options) {
   if (options.convert.resume) return {};
-  try {
-    const std::string path = output_place(options.output, true) + ".part";
-    File part(path, File::Mode::kRead);
-    if (!part.try_lock() || part.size_bytes() == 0) return {};
-    return fmt::format(
-        "{}: {} of an interrupted run are thrown away; --resume goes on with a part of the same input "
-        "and options",
-        path, describe_bytes(part.size_bytes()));
-  } catch (const Error&) {  // there is no part
-    return {};
-  }
+  const std::string part = output_place(options.output, true) + ".part";
+  const std::uint64_t bytes = interrupted_bytes(part);
+  if (bytes == 0) return {};
+  return fmt::format(
+      "{}: {} of an interrupted run are kept until this run is complete; to continue that one instead, "
+      "interrupt and give --resume",
+      part, describe_bytes(bytes));
 }
 
 /// Whether OUTPUT is what --resume would come to. Throws Error{kInvalidArgument} where it is another archive,
@@ -206,6 +202,7 @@ bool is_complete(const ConvertCommandOptions& options, const Prepared& prepared)
     if (!std::filesystem::exists(options.output + ".part", none)) {
       std::filesystem::remove(options.output + ".part.journal", none);
     }
+    remove_part_aside(options.output + ".part");
     return true;
   }
   if (options.convert.overwrite) return false;
@@ -283,7 +280,7 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
     const MemoryPlan memory = plan_memory(*prepared.source, plan, options.convert, job);
     if (share.memory_bytes != 0 && memory.bytes > share.memory_bytes) return std::nullopt;
   }
-  std::string note = note_of_dropped_part(options);
+  std::string note = note_of_interrupted_run(options);
   ConvertSummary summary = convert(*prepared.source, file.output, options.convert, job);
   const ordered_json document =
       document_of(options, summary, counts_of_voids(*prepared.source, summary.source_voids), std::nullopt);
@@ -326,7 +323,7 @@ int run(ConvertCommandOptions options) {
     expected = estimate_error(source, options.convert, job);
   if (common.verbose && !common.quiet) print_plan_notes(source, options.convert, job, expected);
   if (options.convert.max_error) expected.reset();  // it is measured
-  if (const std::string note = note_of_dropped_part(options); !note.empty() && !common.quiet) print_note(note);
+  if (const std::string note = note_of_interrupted_run(options); !note.empty() && !common.quiet) print_note(note);
   const ConvertSummary summary = [&] {
     try {
       return convert(source, options.output, options.convert, job);

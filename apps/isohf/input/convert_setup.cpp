@@ -133,7 +133,8 @@ std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
                    options.inputs.names);
   line.option("-o,--output", "OUTPUT", "The archive to write; then all others are inputs", options.output);
   line.flag("--overwrite", "Replace OUTPUT where it exists", options.convert.overwrite);
-  line.flag("--resume", "Continue OUTPUT.part of an interrupted run, after checking what is there",
+  line.flag("--resume",
+            "Continue OUTPUT.part of an interrupted run, or OUTPUT.part.old if that is larger, after checking it",
             options.convert.resume);
   line.flag("--dry-run", "Print the plan and write nothing, as isohf plan INPUT does", options.dry_run);
   line.option("--shard", "K/N",

@@ -1,6 +1,8 @@
 #include "isohf/archive/journal.h"
 
 #include <algorithm>
+#include <filesystem>
+#include <optional>
 
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/tile/tile_codes.h"
@@ -79,7 +81,90 @@ JournalRecord read_record(std::span<const std::byte> bytes, std::size_t& positio
   return record;
 }
 
+std::string journal_of(const std::string& part) {
+  return part + ".journal";
+}
+
+std::string aside_of(const std::string& part) {
+  return part + ".old";
+}
+
+/// 0 where there is no such file.
+std::uint64_t bytes_of(const std::string& path) {
+  std::error_code none;
+  const std::uintmax_t bytes =
+      std::filesystem::is_regular_file(path, none) ? std::filesystem::file_size(path, none) : 0;
+  return none ? 0 : bytes;
+}
+
+/// Of one that has a journal with records.
+std::uint64_t resumable_bytes(const std::string& part) {
+  return bytes_of(journal_of(part)) > kHeaderBytes ? bytes_of(part) : 0;
+}
+
+/// A file that is there, locked; nullopt where another process writes it, or it cannot be opened.
+std::optional<File> locked(const std::string& path) {
+  try {
+    File file(path, File::Mode::kReadWrite);
+    if (file.try_lock() && file.is_at_path()) return file;
+  } catch (const Error&) {  // whoever opens it next says why
+  }
+  return std::nullopt;
+}
+
+/// The journal first: with it alone aside, the part finds it again.
+void move_part(const std::string& from, const std::string& to) {
+  static_cast<void>(rename_file(journal_of(from), journal_of(to), true));
+  static_cast<void>(rename_file(from, to, true));
+}
+
+/// After a run that was killed between the two steps of move_part().
+void find_journal_again(const std::string& part) {
+  const std::string aside = aside_of(part);
+  for (const auto& [lost, found] : {std::pair(part, aside), {aside, part}}) {
+    const bool is_lost = bytes_of(lost) > 0 && bytes_of(journal_of(lost)) == 0;
+    if (is_lost && bytes_of(found) == 0 && bytes_of(journal_of(found)) > 0)
+      static_cast<void>(rename_file(journal_of(found), journal_of(lost), true));
+  }
+}
+
 }  // namespace
+
+std::uint64_t interrupted_bytes(const std::string& part) {
+  const std::uint64_t bytes = resumable_bytes(part);
+  if (bytes > 0 && !locked(part)) return 0;
+  return std::max(bytes, resumable_bytes(aside_of(part)));
+}
+
+void put_part_aside(const std::string& part) {
+  if (bytes_of(part) == 0) return;
+  const auto lock = locked(part);
+  if (!lock) return;
+  find_journal_again(part);
+  const std::string aside = aside_of(part);
+  if (resumable_bytes(part) <= resumable_bytes(aside)) return;
+  remove_part_aside(part);
+  move_part(part, aside);
+}
+
+void take_part_back(const std::string& part, const Digest& job) {
+  const std::string aside = aside_of(part);
+  if (bytes_of(part) == 0 && bytes_of(aside) == 0) return;
+  const auto lock = bytes_of(part) > 0 ? locked(part) : std::nullopt;
+  if (bytes_of(part) > 0 && !lock) return;
+  find_journal_again(part);
+  if (resumable_bytes(aside) <= resumable_bytes(part)) return;
+  std::vector<std::byte> header(kHeaderBytes);
+  if (File(journal_of(aside), File::Mode::kRead).read_at(0, header) != kHeaderBytes || header != make_header(job))
+    return;
+  remove_file(journal_of(part));
+  move_part(aside, part);
+}
+
+void remove_part_aside(const std::string& part) noexcept {
+  remove_file(aside_of(part));
+  remove_file(journal_of(aside_of(part)));
+}
 
 Journal Journal::start(const std::string& path, const Digest& job) {
   Journal journal(File(path, File::Mode::kReadWrite));

@@ -62,4 +62,17 @@ struct Journal::Opened {
   std::uint64_t header_bytes = 0;
 };
 
+// What an interrupted run left: NAME.part and its journal. A run that starts over keeps both as NAME.part.old and
+// NAME.part.old.journal until it is complete. `part` is NAME.part.
+
+/// Bytes of what was left that a resume may continue, the larger of the two; 0 where there is nothing, or another process
+/// writes it.
+[[nodiscard]] std::uint64_t interrupted_bytes(const std::string& part);
+/// Before a run that starts over. If something was put aside already, the larger of the two is kept.
+void put_part_aside(const std::string& part);
+/// Before a run that resumes: what was put aside becomes NAME.part if it is of this job and the larger of the two.
+void take_part_back(const std::string& part, const Digest& job);
+/// Once the archive is complete.
+void remove_part_aside(const std::string& part) noexcept;
+
 }  // namespace isohf

@@ -66,6 +66,13 @@ Digest job_digest(const TileGrid& grid, const WriterOptions& options) {
   return digest;
 }
 
+/// Returns `path`, once what an interrupted run left there is where this run wants it.
+const std::string& with_old_part_in_place(const std::string& path, const TileGrid& grid, const WriterOptions& options) {
+  const std::string part = output_place(path, options.overwrite) + ".part";
+  options.resume ? take_part_back(part, job_digest(grid, options)) : put_part_aside(part);
+  return path;
+}
+
 }  // namespace
 
 struct ArchiveWriter::State {
@@ -96,7 +103,8 @@ struct ArchiveWriter::State {
         grid(tile_grid),
         options(writer_options),
         contents(tile_grid, writer_options.planes, folder_of(target)),
-        part(target, {options.overwrite, options.resume, kBufferBytes}),
+        part(with_old_part_in_place(target, tile_grid, writer_options),
+             {options.overwrite, options.resume, kBufferBytes}),
         journal_path(part.part_path() + ".journal") {}
 
   /// Errors of the output file with its name.
@@ -566,6 +574,7 @@ std::uint64_t ArchiveWriter::finish(Metadata metadata) {
   state.named([&] { state.part.commit(); });
   state.finished = true;
   remove_file(state.journal_path);
+  remove_part_aside(state.part.part_path());
   return size;
 }
 

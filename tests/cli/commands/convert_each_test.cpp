@@ -125,18 +125,22 @@ TEST_F(ConvertEach, TakesAnIncompleteFileOfThatNameForAnError) {
   EXPECT_EQ(result.err.find("b.isohf", name + 1), std::string::npos) << result.err;
 }
 
-TEST_F(ConvertEach, SaysThatItThrowsAwayWhatAnInterruptedRunLeftAsASingleRunDoes) {
+TEST_F(ConvertEach, SaysThatItKeepsAnInterruptedRunAsASingleRunDoes) {
   fs::create_directories(out_);
   const std::string told = "isohf: " + out_ +
-                           "/b.isohf.part: 4 bytes of an interrupted run are thrown away; --resume goes on with a part "
-                           "of the same input and options\n";
-  const auto leave = [&] { write_text(out_ + "/b.isohf.part", "left"); };
+                           "/b.isohf.part: 4 bytes of an interrupted run are kept until this run is complete; to "
+                           "continue that one instead, interrupt and give --resume\n";
+  const auto leave = [&] {
+    write_text(out_ + "/b.isohf.part", "left");
+    write_text(out_ + "/b.isohf.part.journal", std::string(100, 'x'));
+  };
   leave();
   EXPECT_EQ(each().err, told);
   leave();
   EXPECT_EQ(run_isohf({"convert", in_ + "/b.asc", out_ + "/b.isohf", "--overwrite"}).err, told);
   leave();
   EXPECT_EQ(each({"--overwrite", "-q"}).err, "");
+  EXPECT_EQ(archives().size(), 6U);
 }
 
 TEST_F(ConvertEach, StopsAtABadFileOrKeepsGoing) {
