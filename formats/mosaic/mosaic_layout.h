@@ -112,6 +112,10 @@ struct SampleRectangle {
   std::int64_t rows = 0;
 };
 
+/// Refuses tiles NAME_xCOLUMN_yROW that different cuts of one name left in a folder: those that overlap and do not lie as
+/// their names count, and those whose .json states another scale. Throws Error{kUnsupported} naming two.
+void refuse_mixed_cuts(const std::vector<PlacedMember>& members, const std::vector<SampleKind>& kinds);
+
 /// Moves members by whole turns so that those on both sides of the 180th meridian lie side by side: where more than
 /// half a turn lies empty between them, all West of the gap go East of the others. Nothing else moves.
 void join_antimeridian(std::vector<PlacedMember>& members);

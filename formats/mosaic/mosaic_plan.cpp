@@ -447,7 +447,10 @@ std::vector<PlacedMember> survey(const std::vector<std::string>& paths, const Op
     }
   }
   std::vector<PlacedMember> members = found.finish();
-  if (found.systems().size() == 1) return members;
+  if (found.systems().size() == 1) {
+    refuse_mixed_cuts(members, plan.kinds);
+    return members;
+  }
   const Joining joining(found.systems(), members, found.system_of());
   const auto ways = joining.ways_to(joining.target(onto), plan.info);
   for (std::size_t i = 0; i < members.size(); ++i) members[i].way = ways[found.system_of()[i]];

@@ -1,13 +1,16 @@
 #include "formats/mosaic/mosaic_source.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 
 #include "formats/mosaic/mosaic_pieces.h"
+#include "formats/mosaic/tile_name.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/error_of.h"
@@ -76,6 +79,59 @@ TEST_F(MosaicSource, PiecesGiveTheWholeBitForBitInEveryType) {
       EXPECT_EQ(mosaic->plan().holes.samples, 0);
       EXPECT_TRUE(read_whole(*mosaic) == raster.samples);
     }
+  }
+}
+
+/// Tiles every `step` samples, by the names that export gives them.
+std::map<std::string, Window> named_cut(const CutRaster& raster, std::int64_t step, std::int64_t shared) {
+  std::map<std::string, Window> tiles;
+  for (const Window& window : regular_cut(raster.spec.width, raster.spec.height, step, shared)) {
+    tiles[TileName{"u", window.column / step, window.row / step, ".tif"}.path()] = window;
+  }
+  return tiles;
+}
+
+TEST_F(MosaicSource, TilesThatALargerCutLeftAreRefused) {
+  CutRaster raster = noise_raster(placed_spec(101, 80, SampleType::kInt16, Registration::kPoint));
+  raster.spec.overwrite = true;
+  for (const std::int64_t shared : {0, 1, 5}) {
+    for (const std::int64_t small : {16, 25}) {
+      for (const std::int64_t large : {27, 50, 100}) {
+        SCOPED_TRACE(fmt::format("{} samples shared, {} after {}", shared, large, small));
+        const TemporaryFolder own;
+        std::map<std::string, Window> tiles = named_cut(raster, large, shared);
+        std::vector<std::string> paths;
+        const auto write = [&] {
+          paths.clear();
+          for (const auto& [name, window] : tiles) raster.cut(paths.emplace_back(own / name), window);
+        };
+        write();
+        EXPECT_EQ(why_refused(paths), "not refused");
+        const std::size_t own_tiles = tiles.size();
+        tiles.merge(named_cut(raster, small, shared));
+        if (tiles.size() == own_tiles) continue;
+        write();
+        EXPECT_THAT(why_refused(paths), HasSubstr(".tif: is a tile of another cut than " + (own / "u_x")));
+        tiles = named_cut(raster, small, shared);
+        write();
+        EXPECT_EQ(why_refused(paths), "not refused");
+      }
+    }
+  }
+}
+
+TEST(TileName, IsThatOfExportAlone) {
+  for (const char* path : {"u_x0_y0.r16", "a/b_x1_x12_y345.tif", "./_x1_y2.raw", "a.b_x9999999999_y1.png"}) {
+    const auto name = TileName::of(path);
+    ASSERT_TRUE(name) << path;
+    EXPECT_EQ(name->path(), path);
+  }
+  EXPECT_EQ(TileName::of("a/b_x1_x12_y345.tif")->column, 12);
+  EXPECT_EQ(TileName::of("a/b_x1_x12_y345.tif")->stem, "a/b_x1");
+  for (const char* path :
+       {"u.raw", "u_x1.raw", "u_y1_x1.raw", "u_x01_y1.raw", "u_x1_y.raw", "u_x_y1.raw", "u_x-1_y1.raw", "u_x1_y1a.raw",
+        "u_x+1_y1.raw", "u_x1_y99999999999999999999.raw", "u_x1.5_y1.raw", ""}) {
+    EXPECT_FALSE(TileName::of(path)) << path;
   }
 }
 
