@@ -59,8 +59,8 @@ struct Sidecar {
 
 /// Files beside a raster that it replaces, which would be taken for the new one's: those of sidecar_paths() and GDAL's
 /// .aux.xml, and where the new one says nothing of its place or system a world file and a .prj. Those that the new one
-/// has, and files of another kind under such a name, are not among them.
-[[nodiscard]] std::vector<std::string> stale_sidecars(const std::string& path, const RasterSpec& spec);
+/// has, and files of another kind under such a name, are not among them. nullptr: the raster goes, and none replaces it.
+[[nodiscard]] std::vector<std::string> stale_sidecars(const std::string& path, const RasterSpec* spec);
 
 /// Throws Error{kInvalidArgument} without the path where another kind of file would be replaced: a Radiance picture or
 /// an ENVI header for .hdr, somebody else's .json.

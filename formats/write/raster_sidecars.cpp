@@ -180,18 +180,19 @@ std::vector<std::string> sidecar_paths(const std::string& path) {
   return described ? std::vector<std::string>{path + ".json"} : std::vector<std::string>{};
 }
 
-std::vector<std::string> stale_sidecars(const std::string& path, const RasterSpec& spec) {
+std::vector<std::string> stale_sidecars(const std::string& path, const RasterSpec* spec) {
   std::vector<std::string> stale = sidecar_paths(path);
   stale.push_back(path + ".aux.xml");
   const auto beside = [&](const char* other) { return std::filesystem::path(path).replace_extension(other).string(); };
-  if (!spec.georeference || !spec.georeference->has_origin) {
+  const bool has_place = spec != nullptr && spec->georeference.has_value();
+  if (!has_place || !spec->georeference->has_origin) {
     stale.push_back(world_file_name(path));
     stale.push_back(beside(".wld"));
   }
-  if (!spec.georeference || system_text(spec.georeference->system).empty()) stale.push_back(beside(".prj"));
+  if (!has_place || system_text(spec->georeference->system).empty()) stale.push_back(beside(".prj"));
   std::sort(stale.begin(), stale.end());
   stale.erase(std::unique(stale.begin(), stale.end()), stale.end());
-  const std::vector<Sidecar> kept = sidecars_of(path, spec);
+  const std::vector<Sidecar> kept = spec != nullptr ? sidecars_of(path, *spec) : std::vector<Sidecar>{};
   std::erase_if(stale, [&](const std::string& file) {
     std::error_code ignored;
     if (std::ranges::any_of(kept, [&](const Sidecar& sidecar) { return sidecar.path == file; })) return true;

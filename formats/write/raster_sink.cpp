@@ -10,6 +10,7 @@
 #include "formats/io/text.h"
 #include "formats/readers.h"
 #include "formats/write/encoders.h"
+#include "isohf/base/file.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
 
@@ -128,6 +129,10 @@ std::vector<std::unique_ptr<OutputFile>> begin_sidecars(const std::string& path,
   return files;
 }
 
+void remove_stale_sidecars(const std::string& path, const RasterSpec& spec) {
+  for (const std::string& stale : stale_sidecars(path, &spec)) remove_file(stale);
+}
+
 }  // namespace
 
 RasterSink::RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr<OutputFile> file,
@@ -164,19 +169,34 @@ void RasterSink::write_rows(std::span<const std::byte> rows) {
   rows_written_ += count;
 }
 
-void RasterSink::finish() {
-  if (rows_written_ != spec_.height || !encoder_) {
+void RasterSink::close() {
+  if (rows_written_ != spec_.height) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: finished after {} of {} rows", path_, rows_written_, spec_.height));
   }
-  bool is_removed = false;
+  if (!encoder_) return;
   try {
     encoder_->close();
     encoder_.reset();
-    // All is on the disk before anything gets its name, and what the raster's name stands for is complete when it
-    // appears. Whoever ends the program in between finds no raster, never old samples with a new description.
     file_->sync();
     for (const auto& sidecar : sidecars_) sidecar->sync();
+  } catch (const Error& error) {
+    throw error.within(path_);
+  }
+}
+
+void RasterSink::complete() {
+  close();
+  for (const auto& sidecar : sidecars_) sidecar->complete();
+  file_->complete();
+}
+
+// All is on the disk before anything gets its name, and what the raster's name stands for is complete when it
+// appears. Whoever ends the program in between finds no raster, never old samples with a new description.
+void RasterSink::finish() {
+  close();
+  bool is_removed = false;
+  try {
     if (!sidecars_.empty()) is_removed = file_->remove_replaced();
     for (const auto& sidecar : sidecars_) {
       try {
@@ -186,11 +206,7 @@ void RasterSink::finish() {
       }
     }
     file_->commit();
-    if (!replaces_) return;
-    for (const std::string& stale : stale_sidecars(path_, spec_)) {
-      std::error_code ignored;
-      std::filesystem::remove(stale, ignored);
-    }
+    if (replaces_) remove_stale_sidecars(path_, spec_);
   } catch (const Error& error) {
     if (is_removed) {
       throw Error(error.code(),
@@ -198,6 +214,57 @@ void RasterSink::finish() {
     }
     throw error.within(path_);
   }
+}
+
+void name_raster(const std::string& path, const RasterSpec& spec) {
+  std::string named = path;
+  std::string place;
+  bool is_removed = false;
+  try {
+    place = output_place(path, spec.overwrite);
+    const bool replaces = std::filesystem::exists(place);
+    std::vector<Sidecar> sidecars = sidecars_of(path, spec);
+    std::erase_if(sidecars, holds);
+    if (replaces && !sidecars.empty()) {
+      is_removed = remove_file(place);
+      if (!is_removed) throw Error(ErrorCode::kIo, "cannot be replaced");
+    }
+    for (const Sidecar& sidecar : sidecars) name_part(named = sidecar.path, spec.overwrite);
+    name_part(named = path, spec.overwrite);
+    if (replaces) remove_stale_sidecars(path, spec);
+  } catch (const Error& error) {
+    if (is_removed) {
+      throw Error(error.code(), fmt::format("{}: {}; the samples are complete in {}.part", named, error.what(), place));
+    }
+    drop_raster(path);
+    throw error.within(named);
+  }
+}
+
+void drop_raster(const std::string& path) noexcept {
+  try {
+    std::vector<std::string> files = sidecar_paths(path);
+    files.push_back(path);
+    for (const std::string& file : files) {
+      std::error_code none;
+      remove_file((std::filesystem::is_symlink(file, none) ? std::filesystem::canonical(file, none).string() : file) +
+                  ".part");
+    }
+  } catch (const std::exception&) {  // no memory: they stay
+  }
+}
+
+void remove_raster(const std::string& path) {
+  const auto is_another = [&](const std::string& extension) {
+    const std::string other = std::filesystem::path(path).replace_extension(extension).string();
+    return other != path && std::filesystem::exists(other);
+  };
+  const bool is_alone = std::ranges::none_of(writable_extensions(), is_another);
+  for (const std::string& beside : stale_sidecars(path, nullptr)) {
+    if (is_alone || beside.starts_with(path)) remove_file(beside);
+  }
+  drop_raster(path);
+  remove_file(path);
 }
 
 std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterSpec& spec) {

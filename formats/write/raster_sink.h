@@ -40,6 +40,10 @@ class RasterSink {
 
   /// Completes the file and gives it its name. All rows must have been written. Throws Error{kIo, kInvalidArgument}.
   void finish();
+  /// Puts all of it on the disk, where finish() finds nothing more to write. Throws as finish() does.
+  void close();
+  /// close(), and lets NAME.part go, for name_raster() or drop_raster(): one of many files that get their names together.
+  void complete();
 
  private:
   std::string path_;
@@ -61,6 +65,14 @@ class RasterSink {
 /// Throws Error naming the path: kInvalidArgument (no such extension; sizes, or samples that the format cannot hold;
 /// the file exists and overwrite is not set, or is of another kind), kIo.
 [[nodiscard]] std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterSpec& spec);
+
+/// Gives a raster of RasterSink::complete() its name, as finish() does. `spec` is that of create_raster(). Throws
+/// Error{kIo, kInvalidArgument}.
+void name_raster(const std::string& path, const RasterSpec& spec);
+/// Removes what RasterSink::complete(), or a run that was killed, left of a raster without its name.
+void drop_raster(const std::string& path) noexcept;
+/// Removes a raster and the files beside it, but those that a raster of the same name in another format may share.
+void remove_raster(const std::string& path);
 
 /// Refuses a name that create_raster would refuse, before any work: Error naming the path.
 void check_raster_target(const std::string& path, bool overwrite);

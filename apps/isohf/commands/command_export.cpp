@@ -115,7 +115,7 @@ std::optional<ExportOptions> parse_export(const Arguments& arguments) {
   line.positional("ARCHIVE", "Archive to read", options.archive);
   line.positional("OUTPUT", "-o,--output",
                   "Raster to write: NAME.tif, .exr, .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy", options.output);
-  line.flag("--overwrite", "Replace OUTPUT where it exists", options.overwrite);
+  line.flag("--overwrite", "Replace OUTPUT where it exists, and remove its tiles of another cut", options.overwrite);
   line.group("Grid");
   line.option("--like", "INPUT", "The grid of this raster, or of a folder, \"pattern*\" or @list of them",
               options.like);
@@ -334,6 +334,7 @@ class Exporter {
   bool has_voids = false;
   std::int64_t files = 0;
   std::vector<std::string> written;  ///< those beside them as well
+  std::vector<std::string> removed;  ///< tiles of another cut
 
  private:
   void run_lossless() {
@@ -382,8 +383,10 @@ class Exporter {
           },
           reading);
     }
+    tiles.finish();
     files = tiles.files();
     written = tiles.written();
+    removed = tiles.removed();
     if (counts.clamped == 0 || options_.clamp_range) return;
     display_.clear();
     print_warning(
@@ -486,8 +489,14 @@ int run(const ExportOptions& options) {
   spec.sample_type = options.written_type(metadata);
   spec.overwrite = options.overwrite;
   check_raster_room(options.output, spec, grid.cut.across * grid.cut.down);
-  const std::vector<std::string> names = ExportTiles(options.output, grid.cut, grid.samples.width).names();
+  const ExportTiles tiles(options.output, grid.cut, grid.samples.width);
+  const std::vector<std::string> names = tiles.names();
   for (const std::string& file : names) check_raster_output(inputs, file, options.overwrite);
+  if (const std::vector<std::string> others = tiles.others(); !others.empty() && !options.overwrite) {
+    throw Error(ErrorCode::kInvalidArgument,
+                {others.front(), fmt::format("is a tile of another cut than {} x {}", grid.cut.across, grid.cut.down),
+                 "", "--overwrite removes it, or choose another name"});
+  }
   // What the format does not hold is refused before elevations are looked at.
   (void)create_raster(names.front(), spec);
   Exporter exporter(options, archive, grid);
@@ -520,6 +529,7 @@ int run(const ExportOptions& options) {
                            {"overlap", grid.cut.overlap}}},
                          {"files", exporter.files},
                          {"files_written", exporter.written},
+                         {"tiles_removed", exporter.removed},
                          {"sample_type", to_string(mapping.type)},
                          {"z_scale", mapping.z_scale},
                          {"z_offset", mapping.z_offset},
@@ -541,6 +551,10 @@ int run(const ExportOptions& options) {
       what += kOnAPlane;
     }
     if (exporter.counts.nodata > 0) what += fmt::format(", {} voids", describe_count(exporter.counts.nodata));
+    if (!exporter.removed.empty()) {
+      what += fmt::format(", {} tiles of another cut removed",
+                          describe_count(static_cast<std::int64_t>(exporter.removed.size())));
+    }
     if (exporter.counts.clamped > 0) {
       what += fmt::format(", {} moved into the range", describe_count(exporter.counts.clamped));
     }

@@ -1,12 +1,14 @@
 #include "commands/export_tiles.h"
 
-#include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <utility>
+
+#include "formats/mosaic/tile_name.h"
+#include "isohf/error.h"
 
 namespace isohf::cli {
 namespace {
@@ -20,17 +22,13 @@ ExportTiles::ExportTiles(const std::string& output, const TileCut& cut, std::int
     : output_(output), cut_(cut), width_(width) {}
 
 ExportTiles::~ExportTiles() {
-  open_.clear();
-  std::error_code ignored;
-  for (const std::string& file : new_) std::filesystem::remove(file, ignored);
+  for (const auto& [column, row] : parts_) drop_raster(name(column, row));
 }
 
 std::string ExportTiles::name(std::int64_t column, std::int64_t row) const {
   if (!cut_.asked) return output_;
   const std::filesystem::path path(output_);
-  return (path.parent_path() /
-          fmt::format("{}_x{}_y{}{}", path.stem().string(), column, row, path.extension().string()))
-      .string();
+  return TileName{(path.parent_path() / path.stem()).string(), column, row, path.extension().string()}.path();
 }
 
 std::vector<std::string> ExportTiles::names() const {
@@ -39,6 +37,29 @@ std::vector<std::string> ExportTiles::names() const {
     for (std::int64_t column = 0; column < cut_.across; ++column) all.push_back(name(column, row));
   }
   return all;
+}
+
+std::vector<std::string> ExportTiles::others() const {
+  std::vector<std::string> found;
+  if (!cut_.asked) return found;
+  const auto ours = TileName::of(name(0, 0));
+  std::filesystem::path folder = std::filesystem::path(output_).parent_path();
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.empty() ? "." : folder, none)) {
+    const std::string file = (folder / entry.path().filename()).string();
+    const auto tile = TileName::of(file);
+    if (!tile || tile->stem != ours->stem || tile->extension != ours->extension) continue;
+    if ((tile->column < cut_.across && tile->row < cut_.down) ||
+        !std::filesystem::is_regular_file(entry.symlink_status(none)))
+      continue;
+    try {
+      check_raster_target(file, true);
+      found.push_back(file);
+    } catch (const Error&) {  // another kind of file
+    }
+  }
+  std::ranges::sort(found);
+  return found;
 }
 
 std::int64_t ExportTiles::groups() const {
@@ -92,16 +113,31 @@ void ExportTiles::write_part(TileRow& tiles, std::int64_t first, std::span<const
     }
     tiles.sinks[at]->write_rows(part);
   });
-  if (end < top + cut_.rows) return;
-  for (const auto& sink : tiles.sinks) {
-    const bool is_new = !std::filesystem::exists(sink->files().front());
-    sink->finish();
-    for (std::string& file : sink->files()) {
-      if (is_new) new_.push_back(file);
-      written_.push_back(std::move(file));
+  if (end == top + cut_.rows) complete(tiles);
+}
+
+void ExportTiles::complete(TileRow& tiles) {
+  for (std::size_t at = 0; at < tiles.sinks.size(); ++at) {
+    for (std::string& file : tiles.sinks[at]->files()) written_.push_back(std::move(file));
+    if (!first_) {
+      tiles.sinks[at]->close();
+      first_ = std::move(tiles.sinks[at]);
+      continue;
     }
-    if (++finished_ == files()) new_.clear();  // all is written, whoever interrupts what is left
+    tiles.sinks[at]->complete();
+    parts_.emplace_back(first_column_ + static_cast<std::int64_t>(at), tiles.row);
   }
+}
+
+void ExportTiles::finish() {
+  while (!parts_.empty()) {
+    const auto [column, row] = parts_.back();
+    parts_.pop_back();
+    name_raster(name(column, row), spec_of_(column, row));
+  }
+  first_->finish();
+  removed_ = others();
+  for (const std::string& tile : removed_) remove_raster(tile);
 }
 
 }  // namespace isohf::cli

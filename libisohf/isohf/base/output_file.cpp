@@ -43,6 +43,10 @@ std::string in_bytes(double bytes) {
   return fmt::format("{:.3g} {}", bytes, kUnits[unit]);
 }
 
+[[noreturn]] void refuse_to_replace(const std::string& part) {
+  throw Error(ErrorCode::kIo, fmt::format("was made by another program meanwhile; what was to replace it is {}", part));
+}
+
 std::vector<std::byte> room_for(std::size_t bytes) {
   std::vector<std::byte> buffer;
   buffer.reserve(bytes);
@@ -190,22 +194,38 @@ void OutputFile::sync() {
   is_synced_ = true;
 }
 
+void OutputFile::hand_rights_on() {
+  if (!replaced_) return;
+  // Only root gives files away; then bits that lend an owner's rights stay behind.
+  const bool given = ::fchown(file_.descriptor(), replaced_->owner, replaced_->group) == 0;
+  static_cast<void>(::fchmod(file_.descriptor(), given ? replaced_->mode : replaced_->mode & 0777U));
+}
+
+void OutputFile::complete() {
+  sync();
+  hand_rights_on();
+  keeps_ = true;
+  file_ = File();
+  buffer_ = {};
+}
+
 void OutputFile::commit() {
   sync();
-  if (replaced_) {
-    // Only root gives files away; then bits that lend an owner's rights stay behind.
-    const bool given = ::fchown(file_.descriptor(), replaced_->owner, replaced_->group) == 0;
-    static_cast<void>(::fchmod(file_.descriptor(), given ? replaced_->mode : replaced_->mode & 0777U));
-  }
+  hand_rights_on();
   if (!rename_file(part_path_, place_, overwrite_)) {
     keeps_ = true;
-    throw Error(ErrorCode::kIo,
-                fmt::format("was made by another program meanwhile; what was to replace it is {}", part_path_));
+    refuse_to_replace(part_path_);
   }
   // In place and on the disk: what fails from here on takes nothing back.
   keeps_ = true;
   sync_folder_of(place_);
   file_ = File();
+}
+
+void name_part(const std::string& path, bool overwrite) {
+  const std::string place = output_place(path, overwrite);
+  if (!rename_file(place + ".part", place, overwrite)) refuse_to_replace(place + ".part");
+  sync_folder_of(place);
 }
 
 void write_output(const std::string& path, std::string_view text, bool overwrite) {

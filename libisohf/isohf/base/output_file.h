@@ -73,6 +73,8 @@ class OutputFile {
   void commit();
   /// Leaves NAME.part behind.
   void keep() { keeps_ = true; }
+  /// Leaves NAME.part behind, complete, flushed and closed, for name_part().
+  void complete();
 
   /// The file that is replaced goes, if there is one: nothing stands under the name until commit(), and NAME.part stays
   /// in any case. Returns whether there was one.
@@ -86,6 +88,7 @@ class OutputFile {
   };
 
   void write(std::span<const std::byte> bytes);
+  void hand_rights_on();
 
   std::string path_;
   std::string place_;  ///< with links followed
@@ -99,6 +102,9 @@ class OutputFile {
   bool is_synced_ = false;  ///< nothing was written since the last sync()
   bool keeps_ = false;
 };
+
+/// Gives the part of a completed OutputFile its name. Throws as output_place() and commit() do.
+void name_part(const std::string& path, bool overwrite);
 
 /// Writes a whole file. Throws as OutputFile does, naming it.
 void write_output(const std::string& path, std::string_view text, bool overwrite);
