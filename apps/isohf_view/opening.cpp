@@ -12,6 +12,7 @@
 #include "interrupt.h"
 #include "isohf/convert.h"
 #include "isohf/error.h"
+#include "machine_memory.h"
 #include "output/standard_output.h"
 
 namespace isohf::view {
@@ -57,6 +58,7 @@ std::unique_ptr<ScratchArchive> convert_for_viewing(const Options& options) {
   Job job;
   job.scratch_folder = temporary_folder().string();
   job.threads = options.threads;
+  job.machine_bytes = cli::machine_memory_bytes();
   job.cancel = &cli::watch_interrupts();
   std::vector<Warning> warnings;
   try {

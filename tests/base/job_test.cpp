@@ -44,5 +44,14 @@ TEST(Arena, HasTheThreadsOfItsJob) {
   }
 }
 
+TEST(Job, AQuarterOfTheMachineBoundsWhatNothingElseDoes) {
+  Job job;
+  EXPECT_EQ(job.bound_bytes(), 0U);
+  job.machine_bytes = 4000;
+  EXPECT_EQ(job.bound_bytes(), 1000U);
+  job.memory_bytes = 3000;
+  EXPECT_EQ(job.bound_bytes(), 3000U);
+}
+
 }  // namespace
 }  // namespace isohf

@@ -1,9 +1,11 @@
 #include "options/options_common.h"
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "interrupt.h"
 #include "isohf/base/file.h"
+#include "machine_memory.h"
 #include "options/option_values.h"
 #include "output/standard_output.h"
 
@@ -44,8 +46,13 @@ void add_work_options(CommandLine& line, WorkOptions& options) {
 
 void add_memory_option(CommandLine& line, WorkOptions& options) {
   line.option("--memory", "SIZE",
-              "Stay within SIZE of memory, to a tenth (default: as is fastest); as in 400M or 1.5GiB",
+              "Use at most SIZE of memory, to a tenth, as in 400M or 1.5GiB (default: a quarter of the machine's)",
               [&](const std::string& text) { options.memory_bytes = parse_bytes(text); });
+}
+
+std::uint64_t WorkOptions::unpacked_bytes(std::uint64_t wanted) const {
+  const std::uint64_t bound = job_from(*this).bound_bytes();
+  return bound == 0 ? wanted : std::min(wanted, bound / 3);
 }
 
 std::string scratch_folder_for(const std::string& output) {
@@ -57,11 +64,17 @@ ScratchFolder scratch_of(const WorkOptions& options) {
   return options.memory_bytes == 0 ? std::nullopt : ScratchFolder(options.scratch_folder);
 }
 
-Job job_from(const WorkOptions& options, ProgressDisplay& display) {
+Job job_from(const WorkOptions& options) {
   Job job;
   job.threads = options.threads;
   job.memory_bytes = options.memory_bytes;
+  job.machine_bytes = machine_memory_bytes();
   if (!options.scratch_folder.empty()) job.scratch_folder = options.scratch_folder;
+  return job;
+}
+
+Job job_from(const WorkOptions& options, ProgressDisplay& display) {
+  Job job = job_from(options);
   job.progress = [&display](const Progress& at) { display.update(at.stage, at.unit, at.done, at.total); };
   job.cancel = &watch_interrupts();
   return job;

@@ -23,9 +23,12 @@ void add_common_options(CommandLine& line, CommonOptions& options);
 /// Options of commands that take a while.
 struct WorkOptions {
   int threads = 0;                 ///< 0: all cores
-  std::uint64_t memory_bytes = 0;  ///< 0: no bound
+  std::uint64_t memory_bytes = 0;  ///< 0: a quarter of the machine's
   std::string scratch_folder;
   ProgressMode progress = ProgressMode::kAuto;
+
+  /// The most that is held of packed contents.
+  [[nodiscard]] std::uint64_t unpacked_bytes(std::uint64_t wanted) const;
 };
 
 /// -j alone.
@@ -42,7 +45,9 @@ void add_memory_option(CommandLine& line, WorkOptions& options);
 /// Where files that are written keep what memory has no room for: nowhere where it is not bounded.
 [[nodiscard]] ScratchFolder scratch_of(const WorkOptions& options);
 
-/// A job with these threads and this memory, which `display` shows and an interrupt cancels.
+/// A job with these threads and this memory.
+[[nodiscard]] Job job_from(const WorkOptions& options);
+/// The same, which `display` shows and an interrupt cancels.
 [[nodiscard]] Job job_from(const WorkOptions& options, ProgressDisplay& display);
 
 }  // namespace isohf::cli

@@ -273,12 +273,13 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
   Job job;
   job.threads = share.threads;
   job.memory_bytes = share.memory_bytes;
+  job.machine_bytes = share.machine_bytes;
   job.cancel = &watch_interrupts();
   if (!share.alone) {
     if (info.width > kSmallSamples / info.height) return std::nullopt;
     const Plan plan = make_plan(info, options.convert.plan);
     const MemoryPlan memory = plan_memory(*prepared.source, plan, options.convert, job);
-    if (share.memory_bytes != 0 && memory.bytes > share.memory_bytes) return std::nullopt;
+    if (job.bound_bytes() != 0 && memory.bytes > job.bound_bytes()) return std::nullopt;
   }
   std::string note = note_of_interrupted_run(options);
   ConvertSummary summary = convert(*prepared.source, file.output, options.convert, job);

@@ -37,6 +37,7 @@ Examples:
 
 struct PlanOptions {
   CommonOptions common;
+  WorkOptions work;
   SourceInputs inputs;
   OpenOptions open;
 
@@ -62,12 +63,14 @@ std::optional<PlanOptions> parse_plan(const Arguments& arguments) {
   add_geoid_option(line, options.geoid);
   add_source_options(line, options.open);
   add_mosaic_options(line, options.inputs);
+  add_threads_option(line, options.work.threads);
+  add_memory_option(line, options.work);
   add_common_options(line, options.common);
   line.footer(kPlanFooter);
   if (!line.parse(arguments)) return std::nullopt;
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, "plan: " + why); };
   if (options.inputs.names.empty()) {
-    const std::string option = line.first_given({"Lattice", "Ground", "Input", "Several inputs"});
+    const std::string option = line.first_given({"Lattice", "Ground", "Input", "Several inputs", "Work"});
     if (!option.empty()) refuse(option + " needs an INPUT");
   }
   return options;
@@ -142,15 +145,17 @@ int run(const PlanOptions& options) {
   } else {
     SourceInputs inputs = options.inputs;
     inputs.onto = options.request.ground.projection;
-    OpenedInputs opened = open_inputs(expand_inputs(inputs.names, inputs.recursive), inputs, options.open, {});
+    OpenedInputs opened =
+        open_inputs(expand_inputs(inputs.names, inputs.recursive), inputs, options.open, options.work);
     ConvertOptions convert;
     convert.plan = options.request;
     if (opened.is_reprojected) convert.plan.ground.projection = ProjectionRequest{};
     const std::unique_ptr<HeightSource> source = laid_out(std::move(opened.source), options.geoid, convert.plan.ground);
     understand_ground(source->info(), convert.plan.ground);
     convert.code_type = options.code_type;
+    convert.source_note = opened.note;
     check_spacing_unit(source->info(), convert.plan, options.spacing_in_metres);
-    print_plan(*source, convert, {}, options.common);
+    print_plan(*source, convert, job_from(options.work), options.common);
   }
   return kExitDone;
 }

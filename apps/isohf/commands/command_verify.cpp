@@ -170,9 +170,7 @@ std::unique_ptr<HeightSource> open_as_recorded(const VerifyCommandOptions& optio
   const SourceRecord& record = metadata.source;
   const std::vector<std::string> files = expand_inputs(options.against, false);
   RecordedInput input = recorded_input(record.options.value_or(RecordedOptions{}));
-  if (options.work.memory_bytes != 0) {
-    input.open.unpacked_bytes = std::min(input.open.unpacked_bytes, options.work.memory_bytes / 3);
-  }
+  input.open.unpacked_bytes = options.work.unpacked_bytes(input.open.unpacked_bytes);
   if (!options.geoid.path.empty()) {
     input.geoid = options.geoid;
   } else if (!input.geoid.path.empty()) {

@@ -233,13 +233,14 @@ std::vector<EachFile> files_of_each(const std::vector<std::string>& inputs, bool
 
 int convert_each(const std::vector<EachFile>& files, const EachOptions& options, const WorkOptions& work,
                  const CommonOptions& common, const ConvertOneFile& convert_one, const std::atomic<bool>& cancel) {
-  const std::uint64_t memory_bytes = work.memory_bytes;
+  const Job whole = job_from(work);
   const auto threads = work.threads > 0 ? static_cast<std::size_t>(work.threads)
                                         : std::max<std::size_t>(1, std::thread::hardware_concurrency());
   std::size_t workers = std::min(threads, files.size());
-  if (memory_bytes != 0) workers = std::clamp<std::size_t>(memory_bytes / kLeastShareBytes, 1, workers);
-  const EachShare part{1, memory_bytes / workers, false};
-  const EachShare all{static_cast<int>(threads), memory_bytes, true};
+  if (const std::uint64_t bound = whole.bound_bytes(); bound != 0)
+    workers = std::clamp<std::size_t>(bound / kLeastShareBytes, 1, workers);
+  const EachShare part{1, whole.memory_bytes / workers, whole.machine_bytes / workers, false};
+  const EachShare all{static_cast<int>(threads), whole.memory_bytes, whole.machine_bytes, true};
 
   Gate gate;
   Batch batch(files, options, work, common);

@@ -34,8 +34,9 @@ void add_each_options(CommandLine& line, EachOptions& options);
 /// What a conversion may use.
 struct EachShare {
   int threads = 0;
-  std::uint64_t memory_bytes = 0;  ///< 0: as is fastest
-  bool alone = false;              ///< no other runs beside it
+  std::uint64_t memory_bytes = 0;  ///< as Job has them
+  std::uint64_t machine_bytes = 0;
+  bool alone = false;  ///< no other runs beside it
 };
 
 /// What became of a file.
@@ -50,8 +51,8 @@ struct EachResult {
 using ConvertOneFile = std::function<std::optional<EachResult>(const EachFile& file, const EachShare& share)>;
 
 /// Runs the conversions: small files side by side, one thread each, and large ones alone on all threads; together they
-/// stay within work.memory_bytes. Where the disk is full, none is begun any more. Tells of every file in the order of the
-/// inputs, and of all at the end.
+/// stay within the memory that work allows. Where the disk is full, none is begun any more. Tells of every file in the
+/// order of the inputs, and of all at the end.
 /// Returns the exit code. Throws Error{kCancelled}.
 int convert_each(const std::vector<EachFile>& files, const EachOptions& options, const WorkOptions& work,
                  const CommonOptions& common, const ConvertOneFile& convert_one, const std::atomic<bool>& cancel);

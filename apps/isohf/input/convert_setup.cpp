@@ -118,8 +118,7 @@ void check_shard_options(const CommandLine& line, const ConvertCommandOptions& o
 
 /// What is packed shares the memory with what is read from it, and with the tiles.
 void share_memory(ConvertCommandOptions& options) {
-  if (options.work.memory_bytes == 0) return;
-  options.open.unpacked_bytes = std::min(options.open.unpacked_bytes, options.work.memory_bytes / 3);
+  options.open.unpacked_bytes = options.work.unpacked_bytes(options.open.unpacked_bytes);
 }
 
 std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {

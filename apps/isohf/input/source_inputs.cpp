@@ -152,8 +152,7 @@ RecordedInput recorded_input(const RecordedOptions& recorded) {
 OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inputs, const OpenOptions& options,
                          const WorkOptions& work) {
   OpenedInputs opened;
-  Job job{.threads = work.threads, .memory_bytes = work.memory_bytes};
-  if (!work.scratch_folder.empty()) job.scratch_folder = work.scratch_folder;
+  const Job job = job_from(work);
   opened.note.options = inputs.as_given;
   if (files.size() == 1) {
     opened.source = with_voids_treated(open_raster(files.front(), options), options.voids, job);

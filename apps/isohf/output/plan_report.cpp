@@ -18,8 +18,9 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory, CodeType code_type,
-                            const std::optional<ErrorEstimate>& error, const std::vector<std::string>& warnings) {
+ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory,
+                            std::uint64_t bound_bytes, CodeType code_type, const std::optional<ErrorEstimate>& error,
+                            const std::vector<std::string>& warnings) {
   const std::uint64_t raw =
       static_cast<std::uint64_t>(plan.lattice_samples) * static_cast<std::uint64_t>(raw_bytes(code_type));
   return {
@@ -52,6 +53,7 @@ ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, const Memo
       {"estimated_memory_bytes", memory.bytes},
       {"least_memory_bytes", memory.least_bytes},
       {"scratch_bytes", memory.scratch_bytes},
+      {"memory_bound_bytes", bound_bytes},
       {"warnings", warnings}};
 }
 
@@ -105,18 +107,25 @@ void print_plan(HeightSource& source, const ConvertOptions& options, const Job& 
   const SourceInfo& info = source.info();
   const Plan plan = make_plan(info, options.plan);
   const MemoryPlan memory = plan_memory(source, plan, options, job);
-  check_memory(memory, job);
   std::vector<Warning> all = info.warnings;
   const std::vector<std::string> warnings = plan_warnings(info, plan, options.plan);
   for (const std::string& warning : warnings) all.push_back(warning);
   if (const std::string scale = scale_warning(info, plan.frame, options.plan.ground.projection); !scale.empty()) {
     all.push_back(scale);
   }
+  bool is_refused = false;
+  try {
+    check_memory(source, plan, options, memory, job);
+  } catch (const Error& refusal) {
+    if (job.memory_bytes != 0) throw;  // a bound that was given
+    is_refused = true;
+    all.emplace_back(fmt::format("convert would refuse: {}", refusal.what()));
+  }
   print_warnings(all);
-  const std::optional<ErrorEstimate> error = estimate_error(source, options, job);
+  const std::optional<ErrorEstimate> error = is_refused ? std::nullopt : estimate_error(source, options, job);
   StandardOutput out;
   if (common.json) {
-    out.write(json_text(json_from_plan(info, plan, memory, options.code_type, error, warnings)));
+    out.write(json_text(json_from_plan(info, plan, memory, job.bound_bytes(), options.code_type, error, warnings)));
   } else if (!common.quiet) {
     out.write(text_from_plan(info, plan, memory, options, error));
   }

@@ -1,5 +1,7 @@
 #include "isohf/convert/memory_plan.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -225,19 +227,24 @@ int textured_tiles_in_flight(const Job& job) {
 MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job,
                        std::uint64_t texture_bytes) {
   const Prefilter prefilter = Prefilter::make(options.filter.value_or(kDefaultFilter), options.acquisition);
-  const Estimate estimate(source, plan, options, job, prefilter, texture_bytes, job.memory_bytes);
+  const Estimate estimate(source, plan, options, job, prefilter, texture_bytes, job.bound_bytes());
   const Estimate least(source, plan, options, job, prefilter, texture_bytes, 1);
   const std::uint64_t least_bytes =
       std::min(least.with(kRations.back(), false).bytes, least.with(kRations.back(), true).bytes);
   const auto choose = [&]() -> MemoryPlan {
-    if (job.memory_bytes == 0) return estimate.with(kRations[kUnlimitedRation], false);
+    if (job.memory_bytes == 0) {
+      const MemoryPlan fastest = estimate.with(kRations[kUnlimitedRation], false);
+      if (job.bound_bytes() == 0 || fastest.bytes <= job.bound_bytes()) return fastest;
+    }
     for (const bool in_scratch : {false, true}) {
       for (const Ration& ration : kRations) {
         const MemoryPlan memory = estimate.with(ration, in_scratch);
-        if (memory.bytes <= job.memory_bytes) return memory;
+        if (memory.bytes <= job.bound_bytes()) return memory;
       }
     }
-    return estimate.with(kRations.back(), true);
+    const MemoryPlan in_memory = estimate.with(kRations.back(), false);
+    const MemoryPlan in_scratch = estimate.with(kRations.back(), true);
+    return in_scratch.bytes < in_memory.bytes ? in_scratch : in_memory;
   };
   MemoryPlan memory = choose();
   memory.least_bytes = least_bytes;
@@ -254,9 +261,39 @@ MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const Conve
   return plan_memory(source, plan, options, job, texture_bytes);
 }
 
-void check_memory(const MemoryPlan& memory, const Job& job) {
-  require_memory(job, static_cast<double>(memory.bytes), static_cast<double>(memory.least_bytes), "this conversion",
-                 "smaller tiles (`shape`)");
+namespace {
+
+/// What takes less memory, if something does: rows of the source that stay rows, or a part of it.
+std::string remedy_for(const HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job) {
+  if (!plan.frame.warp) return "smaller tiles (`shape`)";
+  ConvertOptions other = options;
+  ProjectionRequest& kept = other.plan.ground.projection;
+  const bool in_degrees = source.info().georeference.unit == HorizontalUnit::kDegree;
+  kept = {};
+  kept.is_auto = false;
+  kept.kind = in_degrees ? ProjectionKind::kEquirectangular : ProjectionKind::kNone;
+  const std::string part = options.source_note.mosaic ? "one conversion for each input" : "a part of it (`bbox`)";
+  try {
+    const MemoryPlan less = plan_memory(source, make_plan(source.info(), other.plan), other, job);
+    if (less.bytes > job.bound_bytes()) return part;
+    return fmt::format("`projection` {}, which takes {}, or {}", kept.name(),
+                       describe_memory(static_cast<double>(less.bytes)), part);
+  } catch (const Error&) {  // which that projection is not for
+    return part;
+  }
+}
+
+}  // namespace
+
+void check_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options, const MemoryPlan& memory,
+                  const Job& job) {
+  if (job.bound_bytes() == 0 || memory.bytes <= job.bound_bytes()) return;
+  try {
+    require_memory(job, static_cast<double>(memory.bytes), static_cast<double>(memory.least_bytes), "this conversion",
+                   remedy_for(source, plan, options, job));
+  } catch (const Error& error) {
+    throw error.within(source.info().path);
+  }
 }
 
 }  // namespace isohf

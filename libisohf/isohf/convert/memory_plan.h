@@ -34,8 +34,8 @@ struct MemoryPlan {
   std::uint64_t source_buffer_bytes = 0;  ///< what the source may keep of decoded blocks
 };
 
-/// The one estimate that plans, bounds and convert() go by. Takes the fastest way that stays within job.memory_bytes, or
-/// the most frugal one where none does: bytes > memory_bytes then.
+/// The one estimate that plans, bounds and convert() go by. Takes the fastest way that stays within the job's bound, or
+/// the most frugal one where none does: bytes exceed it then.
 /// texture_bytes: what a TextureStage takes, where there is one.
 [[nodiscard]] MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options,
                                      const Job& job, std::uint64_t texture_bytes);
@@ -44,9 +44,9 @@ struct MemoryPlan {
 [[nodiscard]] MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options,
                                      const Job& job);
 
-/// Throws Error{kOutOfMemory} where a plan takes more than job.memory_bytes allow: before a conversion, and where only
-/// its plan is asked for.
-void check_memory(const MemoryPlan& memory, const Job& job);
+/// Throws Error{kOutOfMemory} if a plan takes more than the job's bound, with what takes less.
+void check_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options, const MemoryPlan& memory,
+                  const Job& job);
 
 /// Tiles in flight where each brings a texture along.
 [[nodiscard]] int textured_tiles_in_flight(const Job& job);

@@ -327,7 +327,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
   const MemoryPlan memory =
       plan_memory(source, plan, options, job,
                   (textures ? textures->memory_bytes() : 0) + TilesAround::memory_bytes(plan.grid, beside));
-  check_memory(memory, job);
+  check_memory(source, plan, options, memory, job);
   source.limit_buffers(memory.source_buffer_bytes);
   if (options.lossless && info.fill_distance > 0 && &source.as_stored() == &source) {
     throw Error(ErrorCode::kInvalidArgument,

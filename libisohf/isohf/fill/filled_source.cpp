@@ -349,7 +349,7 @@ std::unique_ptr<HeightSource> with_voids_treated(std::unique_ptr<HeightSource> s
   if (!treatment.does_anything()) return source;
   require_source(source->info());
   const std::uint64_t in_memory = fill_memory_bytes(treated_info(source->info(), treatment), false);
-  const bool in_scratch = job.memory_bytes != 0 && in_memory > job.memory_bytes / 3;
+  const bool in_scratch = job.bound_bytes() != 0 && in_memory > job.bound_bytes() / 3;
   return std::make_unique<FilledSource>(std::move(source), treatment,
                                         in_scratch ? ScratchFolder(job.scratch_folder) : std::nullopt);
 }

@@ -140,6 +140,7 @@ void subtract_archives(const std::string& first, const std::string& second, cons
   const SampleGrid grid = natural_grid(a.metadata());
   Job half = job;
   half.memory_bytes /= 2;
+  half.machine_bytes /= 2;
   Arena(job).execute([&] {
     const auto rows_of = [&](const ArchiveReader& archive) {
       try {

@@ -281,11 +281,12 @@ struct RowReader::State {
              static_cast<double>(rows_at_once * grid.width) * kSampleBytes +
              GridSampler::memory_bytes(tiles, grid, method, rows_at_once, threads_of(job), in_scratch);
     };
-    if (job.memory_bytes == 0) return std::nullopt;
+    const auto bound = static_cast<double>(job.bound_bytes());
+    if (bound == 0.0) return std::nullopt;
     const double in_memory = bytes(false);
-    if (in_memory > static_cast<double>(job.memory_bytes)) {
+    if (in_memory > bound) {
       rows_at_once = std::min(std::max(kRowsOfScratch, rows_at_once), grid.height);
-      while (rows_at_once > 1 && bytes(true) > static_cast<double>(job.memory_bytes)) rows_at_once /= 2;
+      while (rows_at_once > 1 && bytes(true) > bound) rows_at_once /= 2;
     }
     return scratch_for(job, in_memory, bytes(true), "this grid");
   }

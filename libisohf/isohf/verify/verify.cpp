@@ -203,7 +203,7 @@ class Verification {
   void divide_memory() {
     const auto at_once = [&](std::int64_t tiles) { return std::min(tiles * threads_of(job_), grid_.tile_columns()); };
     tiles_at_once_ = at_once(kTilesPerThread);
-    if (job_.memory_bytes != 0 && memory_bytes(tiles_at_once_, true) > static_cast<double>(job_.memory_bytes)) {
+    if (job_.bound_bytes() != 0 && memory_bytes(tiles_at_once_, true) > static_cast<double>(job_.bound_bytes())) {
       tiles_at_once_ = at_once(kLeastTilesPerThread);
     }
     scratch_ = scratch_for(job_, memory_bytes(tiles_at_once_, false), memory_bytes(tiles_at_once_, true), "verifying");

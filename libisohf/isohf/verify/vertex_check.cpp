@@ -102,8 +102,7 @@ class VertexCheck {
     constexpr std::uint64_t kLeastReadBytes = std::uint64_t{1} << 20U;
     const SourceInfo& info = source_.info();
     Ways ways{ReadStep::make(info, kReadBytes), 0, grid_.tile_columns()};
-    if (job.memory_bytes == 0) return ways;
-    source_.limit_buffers(kReadBytes);
+    if (job.bound_bytes() == 0) return ways;
     std::int64_t rows = 1;
     for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
       const RowRange needed = cutter.rows_needed(row);
@@ -123,8 +122,10 @@ class VertexCheck {
                  BandReader::memory_bytes(prefilter_, 2, rows, columns.last - columns.first + 1, info)) +
              static_cast<double>(grid_.tile_columns()) * sizeof(VertexReport);
     };
-    const auto limit = static_cast<double>(job.memory_bytes);
-    if (bytes(ways) <= limit) return ways;
+    const auto limit = static_cast<double>(job.bound_bytes());
+    const bool is_free = bytes(ways) <= limit;
+    if (!is_free || job.memory_bytes != 0) source_.limit_buffers(kReadBytes);
+    if (is_free) return ways;
     ways.step = ReadStep::make(info, kLeastReadBytes);
     ways.kept_rows = SourceRows::kept_rows_for(ways.step, rows);
     const SourceGeometry geometry = archive_geometry(metadata_);

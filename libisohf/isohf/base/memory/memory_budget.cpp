@@ -24,9 +24,26 @@ double reading_bytes(const Job& job, double vertices_of_tile) {
   return kProgramBytes + threads_of(job) * (kThreadBytes + kDecodingBytesPerVertex * vertices_of_tile);
 }
 
+std::string describe_memory(double bytes) {
+  return bytes < 999.5e6 ? fmt::format("{:.3g} MB", bytes / 1e6) : fmt::format("{:.3g} GB", bytes / 1e9);
+}
+
 void require_memory(const Job& job, double bytes, double least, const std::string& what, const std::string& remedy) {
-  if (job.memory_bytes == 0 || bytes <= static_cast<double>(job.memory_bytes)) return;
+  if (job.bound_bytes() == 0 || bytes <= static_cast<double>(job.bound_bytes())) return;
   constexpr std::uint64_t kMega = 1000000;
+  if (job.memory_bytes == 0) {
+    const std::string needed = describe_memory(least);
+    const std::string most = describe_memory(static_cast<double>(job.bound_bytes()));
+    const std::string allow = fmt::format(
+        "`memory_bytes` {} allows it{}",
+        least < 1e9 ? fmt::format("{}MB", std::ceil(least / 1e6))
+                    : fmt::format("{}GB", least < 1e10 ? std::ceil(least / 1e8) / 10.0 : std::ceil(least / 1e9)),
+        remedy.empty() ? "" : ", or use " + remedy);
+    throw Error(
+        ErrorCode::kOutOfMemory,
+        fmt::format("{} needs {} of memory, more than a quarter of this machine's, {}; {}", what, needed, most, allow),
+        {"memory", needed, "at most " + most, allow});
+  }
   const auto enough = static_cast<std::uint64_t>(std::ceil(least / static_cast<double>(kMega)));
   std::vector<std::string> less;
   if (!remedy.empty()) less.push_back(remedy);
@@ -40,7 +57,7 @@ void require_memory(const Job& job, double bytes, double least, const std::strin
 }
 
 ScratchFolder scratch_for(const Job& job, double in_memory, double in_scratch, const std::string& what) {
-  if (job.memory_bytes == 0 || in_memory <= static_cast<double>(job.memory_bytes)) return std::nullopt;
+  if (job.bound_bytes() == 0 || in_memory <= static_cast<double>(job.bound_bytes())) return std::nullopt;
   require_memory(job, in_scratch, in_scratch, what, "");
   return job.scratch_folder;
 }

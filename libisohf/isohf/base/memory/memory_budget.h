@@ -19,7 +19,10 @@ void give_back_freed_memory();
 /// What a program that reads archives takes, whatever it does.
 [[nodiscard]] double reading_bytes(const Job& job, double vertices_of_tile);
 
-/// Throws Error{kOutOfMemory} where job.memory_bytes do not allow `bytes`; `least` is said to be enough. what  does:
+/// "80.8 GB", "197 MB".
+[[nodiscard]] std::string describe_memory(double bytes);
+
+/// Throws Error{kOutOfMemory} if the job's bound does not allow `bytes`; `least` is enough. what  does:
 /// "this conversion"   remedy: other than that
 void require_memory(const Job& job, double bytes, double least, const std::string& what, const std::string& remedy);
 

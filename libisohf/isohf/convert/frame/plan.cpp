@@ -343,7 +343,7 @@ double band_rows(const Plan& plan) {
   const SourceWarp warp(plan.grid, *plan.frame.warp, 0.0);
   const auto last = static_cast<double>(plan.frame.height - 1);
   double most = 0.0;
-  for (const SourceWarp::RowBounds& bounds : warp.reading_bounds()) {
+  for (const SourceWarp::RowBounds& bounds : warp.reading_bounds(true)) {
     most = std::max(most, std::clamp(bounds.most, 0.0, last) - std::clamp(bounds.least, 0.0, last));
   }
   return most + 2.0;

@@ -417,9 +417,9 @@ class ShadeRenderer {
     const auto few = std::min<std::int64_t>(rows_at_once_, kBlockRows);
     scratch_ = scratch_for(job_, memory_bytes(false, few), memory_bytes(true, 1), "this picture");
     const auto fits = [this](std::int64_t rows) {
-      return memory_bytes(scratch_.has_value(), rows) <= static_cast<double>(job_.memory_bytes);
+      return memory_bytes(scratch_.has_value(), rows) <= static_cast<double>(job_.bound_bytes());
     };
-    while (job_.memory_bytes != 0 && rows_at_once_ > 1 && !fits(rows_at_once_))
+    while (job_.bound_bytes() != 0 && rows_at_once_ > 1 && !fits(rows_at_once_))
       rows_at_once_ -= (rows_at_once_ + 7) / 8;
     if (scratch_) south_stride_ = 1;
   }

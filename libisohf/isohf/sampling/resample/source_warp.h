@@ -82,10 +82,11 @@ class SourceWarp {
     double least;
     double most;
   };
-  [[nodiscard]] RowBounds row_bounds(std::int64_t tile_row) const;
+  /// rough  in a few hundred steps at most, with a margin that allows for them
+  [[nodiscard]] RowBounds row_bounds(std::int64_t tile_row, bool rough = false) const;
   /// The bounds of every row of tiles, widened so that neither end goes back from one to the next (around a pole it
   /// would): a source is read once, from North to South.
-  [[nodiscard]] std::vector<RowBounds> reading_bounds() const;
+  [[nodiscard]] std::vector<RowBounds> reading_bounds(bool rough = false) const;
 
   [[nodiscard]] const ExactWarp& exact() const { return exact_; }
 

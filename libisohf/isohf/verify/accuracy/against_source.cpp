@@ -138,15 +138,14 @@ class Comparison {
 
   /// Where a row of tiles is kept. Throws Error{kOutOfMemory}.
   ScratchFolder choose_memory(const Job& job) {
-    if (job.memory_bytes == 0) return std::nullopt;
+    if (job.bound_bytes() == 0) return std::nullopt;
     constexpr std::uint64_t kBufferBytes = std::uint64_t{8} << 20U;
-    source_.limit_buffers(kBufferBytes);
     const auto width = static_cast<double>(info_.width);
     const double tiles = VertexRows::memory_bytes(grid_, 0.0);
     // Of projected samples the rows under a row of tiles are many, and its tiles as doubles.
     double rows = static_cast<double>(rows_at_once_ + 2 * reach_ + 4);
     if (warp_) {
-      for (const SourceWarp::RowBounds& bounds : SourceWarp(grid_, warp_->place(), 0.0).reading_bounds())
+      for (const SourceWarp::RowBounds& bounds : SourceWarp(grid_, warp_->place(), 0.0).reading_bounds(true))
         rows =
             std::max(rows, std::min(bounds.most - bounds.least + 2.0 * kMostReach, static_cast<double>(info_.height)));
     }
@@ -155,6 +154,9 @@ class Comparison {
                          rows * width * 10.0 +
                          threads_of(job) * 8.0 * static_cast<double>(grid_.tile_columns() * grid_.shape().columns()) +
                          (warp_ ? 2.0 * tiles : 0.0);
+    if (job.memory_bytes != 0 || bytes + tiles > static_cast<double>(job.bound_bytes())) {
+      source_.limit_buffers(kBufferBytes);
+    }
     return scratch_for(job, bytes + tiles, bytes, "comparing");
   }
 
