@@ -91,11 +91,11 @@ ClosedSource::ClosedSource(const Window& window, std::unique_ptr<HeightSource>&&
 ClosedSource::ClosedSource(const Window& window, std::unique_ptr<HeightSource>&& source,
                            std::optional<std::int64_t> other_row)
     : WindowedSource(std::move(source), window) {
-  std::string text =
-      fmt::format("{}: column {} is the first one again, 360 degrees on, and is left out", info().path, info().width);
-  mutable_info().warnings.push_back(
-      !other_row ? Warning(std::move(text))
-                 : loss(fmt::format("{}, although its samples are others: in row {}, for one", text, *other_row)));
+  if (!other_row) return;
+  mutable_info().warnings.push_back(loss(
+      fmt::format("{}: column {} is the first one again, 360 degrees on, and is left out, although its samples are "
+                  "others: in row {}, for one",
+                  info().path, info().width, *other_row)));
 }
 
 }  // namespace isohf

@@ -94,7 +94,7 @@ TEST_F(Convert, APatternWithoutAPlaceIsJoined) {
     return 10.0 * std::sin(2.0 * std::numbers::pi * static_cast<double>(c) / kColumns) + static_cast<double>(r);
   });
   ConvertOptions options = small_tiles(Filter::kLimitedCubic);
-  options.plan.ground.wrap_x = true;
+  options.plan.ground.wrap = Wrap::kAlways;
   const ConvertSummary summary = convert(pattern, path("a.isohf"), options);
   EXPECT_TRUE(summary.metadata.wraps_x);
   EXPECT_NEAR(summary.metadata.grid.world_width(), kColumns, 1e-9) << "a period, not one spacing less";

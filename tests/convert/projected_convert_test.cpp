@@ -168,7 +168,7 @@ TEST(JoinedGlobe, TilesAcrossTheJoinShareTheirVertices) {
       });
       source.mutable_info().georeference = test::place_at(registration, HorizontalUnit::kDegree, -180.0, 90.0, 1.0);
       ConvertOptions options = options_for("auto");
-      options.plan.ground.wrap_x = true;
+      options.plan.ground.wrap = Wrap::kAlways;
       options.filter = filter_from_string(filter);
       options.overwrite = true;
       (void)convert(source, folder / "a.isohf", options);
@@ -216,7 +216,7 @@ TEST(JoinedGlobe, AnInputThatDoesNotGoRoundIsRefused) {
   const test::TemporaryFolder folder;
   const auto source = source_over(kGrounds[0], 200, 220);
   ConvertOptions options = options_for("auto");
-  options.plan.ground.wrap_x = true;
+  options.plan.ground.wrap = Wrap::kAlways;
   EXPECT_STREQ(test::error_of([&] { (void)convert(*source, folder / "a.isohf", options); }).what(),
                "memory: `wrap_x` needs columns all the way round, 360 degrees; this input's 200 columns 0.04 apart "
                "make 8");

@@ -148,7 +148,7 @@ TEST_F(Extract, OfDegreesAndGlobesKeepsElevationsAndPlaces) {
       expect_same_elevations(folder / "whole.isohf", 0, {{4, 2}, {grid.tile_columns(), grid.tile_rows()}});
     }
     options.plan.ground = {};
-    options.plan.ground.wrap_x = true;
+    options.plan.ground.wrap = Wrap::kAlways;
     const auto globe = degrees(registration == Registration::kArea ? -179.0 : -180.0, 89.0, 2.0, registration);
     (void)convert(*globe, folder / "globe.isohf", options);
     const ArchiveReader whole(folder / "globe.isohf");

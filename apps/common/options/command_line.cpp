@@ -465,6 +465,13 @@ void CommandLine::flag(const std::string& flags, const std::string& description,
   state_->add(flags, {.description = description, .values = 0, .take = take});
 }
 
+void CommandLine::flag(const std::string& flags, const std::string& description, std::function<void()> given) {
+  const auto take = [given = std::move(given)](const Values& values) {
+    if (values.front() == "true") given();
+  };
+  state_->add(flags, {.description = description, .values = 0, .take = take});
+}
+
 void CommandLine::words(const std::vector<std::string>& words) {
   state_->options.back().words = words;
 }

@@ -58,6 +58,7 @@ class CommandLine {
   /// `given` is called where the flag is set, also by the --config file.
   void flag(const std::string& flags, const std::string& description, bool& value,
             std::function<void()> given = nullptr);
+  void flag(const std::string& flags, const std::string& description, std::function<void()> given);
   /// At most one of these long options may be given.
   void exclusive(const std::vector<std::string>& options);
   /// What --help ends with: examples and notes.

@@ -119,6 +119,7 @@ std::string text_from(const ConvertCommandOptions& options, const ConvertSummary
     say("map scale", "not known: " + why);
   }
   if (metadata.projection) say("projection", describe_projection(*metadata.projection));
+  if (metadata.wraps_x) say("joins", "the East edge is the West edge");
   say("size", describe_size(metadata, summary.tile_bytes));
   if (summary.residual_bytes > 0) {
     say("residuals",

@@ -150,7 +150,8 @@ int run(const PlanOptions& options) {
     ConvertOptions convert;
     convert.plan = options.request;
     if (opened.is_reprojected) convert.plan.ground.projection = ProjectionRequest{};
-    const std::unique_ptr<HeightSource> source = laid_out(std::move(opened.source), options.geoid, convert.plan.ground);
+    const std::unique_ptr<HeightSource> source =
+        laid_out(std::move(opened.source), options.geoid, convert.plan.ground, false);
     understand_ground(source->info(), convert.plan.ground);
     convert.code_type = options.code_type;
     convert.source_note = opened.note;

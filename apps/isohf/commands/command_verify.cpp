@@ -185,9 +185,11 @@ std::unique_ptr<HeightSource> open_as_recorded(const VerifyCommandOptions& optio
     onto.kind = ProjectionKind::kSystem;
     onto.system = system;
   }
+  OpenedInputs opened = open_inputs(files, input.inputs, input.open, options.work);
   GroundRequest ground;
-  ground.wrap_x = metadata.wraps_x;
-  return laid_out(open_inputs(files, input.inputs, input.open, options.work).source, input.geoid, ground);
+  const bool lost_a_column = opened.source->info().width == record.width + 1;
+  ground.wrap = metadata.wraps_x || lost_a_column ? Wrap::kAlways : Wrap::kNever;
+  return laid_out(std::move(opened.source), input.geoid, ground, true);
 }
 
 /// What of the measured error is more than was allowed; empty where nothing is.

@@ -216,8 +216,10 @@ Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files)
   options.inputs.onto = options.convert.plan.ground.projection;
   OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work);
   if (opened.is_reprojected) options.convert.plan.ground.projection = ProjectionRequest{};
-  Prepared prepared{std::move(opened.files),
-                    laid_out(std::move(opened.source), options.geoid, options.convert.plan.ground), nullptr};
+  Prepared prepared{
+      std::move(opened.files),
+      laid_out(std::move(opened.source), options.geoid, options.convert.plan.ground, options.convert.lossless),
+      nullptr};
   understand_ground(prepared.source->info(), options.convert.plan.ground);
   options.input = prepared.source->info().path;
   options.convert.source_note = opened.note;

@@ -25,7 +25,11 @@ void add_ground_options(CommandLine& line, GroundRequest& request) {
                 request.projection = ProjectionRequest::parse(is_kind ? text : system_from(text));
               });
   line.words(kinds);
-  line.flag("--wrap-x", "Join the East edge of an input all the way round to its West edge", request.wrap_x);
+  line.flag("--wrap-x", "Require that the input goes all the way round, and join its East edge to its West edge",
+            [&] { request.wrap = Wrap::kAlways; });
+  line.flag("--no-wrap", "Leave an input that goes all the way round open (default: join its edges)",
+            [&] { request.wrap = Wrap::kNever; });
+  line.exclusive({"--wrap-x", "--no-wrap"});
 }
 
 void add_geoid_option(CommandLine& line, GeoidRequest& request) {
@@ -41,15 +45,23 @@ std::unique_ptr<HeightSource> with_geoid(std::unique_ptr<HeightSource> source, c
 }
 
 std::unique_ptr<HeightSource> laid_out(std::unique_ptr<HeightSource> source, const GeoidRequest& geoid,
-                                       const GroundRequest& ground) {
-  if (ground.wrap_x) source = without_repeated_column(std::move(source));
-  return with_geoid(std::move(source), geoid);
+                                       const GroundRequest& ground, bool keeps_samples) {
+  return with_geoid(without_repeated_column(std::move(source), ground, keeps_samples), geoid);
 }
 
-std::unique_ptr<HeightSource> without_repeated_column(std::unique_ptr<HeightSource> source) {
+std::unique_ptr<HeightSource> without_repeated_column(std::unique_ptr<HeightSource> source, GroundRequest ground,
+                                                      bool keeps_samples) {
+  const SourceInfo& info = source->info();
+  if (ground.wrap == Wrap::kNever || (ground.wrap == Wrap::kAuto && keeps_samples)) return source;
   GroundRequest own;
-  understand_ground(source->info(), own);
-  if (closure_of(source->info(), own.source_map.get()) != Closure::kRepeated) return source;
+  understand_ground(info, own);
+  if (closure_of(info, own.source_map.get()) != Closure::kRepeated) return source;
+  if (ground.wrap == Wrap::kAuto) {
+    SourceInfo closed = info;
+    --closed.width;
+    understand_ground(closed, ground);
+    if (!make_source_frame(closed, ground).wraps_x) return source;
+  }
   return std::make_unique<ClosedSource>(std::move(source));
 }
 

@@ -20,11 +20,18 @@
 
 namespace isohf {
 
+/// Whether a source's East edge is joined to its West edge.
+enum class Wrap {
+  kAuto,    ///< if it goes all the way round and its rows stay rows
+  kNever,   ///< never
+  kAlways,  ///< as kAuto, and refuse any other; a source without a place is joined as a pattern
+};
+
 /// How a source is laid out on the ground plane.
 struct GroundRequest {
   /// Of degrees, auto by default; of a source on a map of its own only where the user gives one.
   ProjectionRequest projection;
-  bool wrap_x = false;                                       ///< join the East edge to the West edge
+  Wrap wrap = Wrap::kAuto;
   std::shared_ptr<const ReferenceMap> source_map = nullptr;  ///< of a source on a map of its own, where understood
   std::string why_no_map;                                    ///< in one line, where there is a system and no map
 };
@@ -43,7 +50,7 @@ struct PlanRequest {
   std::optional<double> spacing;             ///< lattice column step, world units, > 0
   std::optional<std::pair<std::int64_t, std::int64_t>> tiles;  ///< tile columns, rows
   /// Instead: a column for each of the source's and two rows for each, so that every sample is a vertex: twice as many
-  /// vertices as samples. Not for sources that are projected or joined.
+  /// vertices as samples. Not for sources that are projected, or joined with columns that no tiles divide.
   bool through_samples = false;
   bool fit = false;  ///< stretch the extents a little so that tiles end on the source's edge
   Outside outside = Outside::kCover;

@@ -268,7 +268,7 @@ std::vector<Plan> plans_for(const SourceInfo& info, const ConvertOptions& option
   const Plan first = plan_conversion(info, options);
   if (!is_density_free(request)) return {first};
   std::vector<Plan> plans;
-  const bool can_meet_samples = !first.frame.warp && !first.frame.wraps_x && !request.fit;
+  const bool can_meet_samples = can_go_through_samples(first.frame, request);
   const double most = can_meet_samples ? 2.0 : kMostDensity;
   for (double density = kLeastDensity; density < most; density *= kDensityStep) {
     request.density = density;

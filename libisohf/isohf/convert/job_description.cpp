@@ -139,6 +139,8 @@ std::string fingerprint(const SourceInfo& info, const Plan& plan, const ConvertO
                        on.spec.parallel_2, on.spec.scale_0, on.origin.easting, on.origin.northing,
                        plan.frame.wraps_x ? " round" : "");
     if (!on.spec.system.text.empty()) job += fmt::format(" by {} {}", on.spec.system.text, on.spec.system.operation);
+  } else if (plan.frame.wraps_x) {
+    job += " | round";
   }
   if (options.texture) {
     const TextureRequest& texture = *options.texture;

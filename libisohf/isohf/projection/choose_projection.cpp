@@ -239,9 +239,6 @@ class Choice {
     const ScaleError flat_error =
         has_flat ? worst_scale_error(Projection(flat), ground_) : ScaleError{HUGE_VAL, middle_};
     const auto flat_because = [&](const std::string& why) { return ProjectionChoice{flat, flat_error, why}; };
-    if (has_flat && problem_.wraps_x) {
-      return flat_because("--wrap-x needs the input's rows to stay rows");  // NOLINT: as archives have recorded it
-    }
     if (has_flat && flat_error.worst <= kEquirectangularError) {
       return flat_because(fmt::format("lengths err by no more than {:g} %", 100.0 * kEquirectangularError));
     }
@@ -251,6 +248,9 @@ class Choice {
     }
     std::optional<ProjectionChoice> best;
     for (const Kind kind : {Kind::kLambertConformal, Kind::kTransverseMercator, Kind::kPolarStereographic}) {
+    if (has_flat && problem_.wraps_x) {
+      return flat_because("--wrap-x needs the input's rows to stay rows");  // NOLINT: as archives have recorded it
+    }
       const ProjectionSpec spec = specify_freely(kind);
       if (!fault_of(spec).empty()) continue;
       const ScaleError error = worst_scale_error(Projection(spec), ground_);

@@ -99,7 +99,7 @@ TEST_F(ExportBox, IsTheSameOnAMapFromWhicheverSideItIsCounted) {
 
 TEST_F(ExportBox, GoesOnAcrossTheEndsOfAGlobe) {
   write_degrees(folder / "globe", 720, 360, -180.0, -90.0, 0.5, land);
-  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--wrap-x"}}) {
+  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--no-wrap"}}) {
     SCOPED_TRACE(more.size());
     convert("globe.flt", more);
     const Raster west = exported("170,-10,180,10");

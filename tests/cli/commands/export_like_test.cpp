@@ -281,7 +281,7 @@ TEST_F(ExportLike, FindsAllColumnsOfAGlobeThatCountsFromTheOtherSide) {
   write_degrees(folder / "from_0", 144, 72, 0.0, -90.0, 2.5, hills);
   write_degrees(folder / "around_0", 144, 72, -180.0, -90.0, 2.5, hills);
   write_degrees(folder / "box", 24, 16, -30.0, -20.0, 2.5, hills);
-  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--wrap-x"}}) {
+  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--no-wrap"}}) {
     convert("from_0.flt", "equirectangular", more);
     for (const std::string name : {"around_0.flt", "box.flt"}) {
       for (const std::string method : {"hex", "barycentric"}) {

@@ -1,4 +1,4 @@
-/// Mosaics, --bbox, --wrap-x, --geoid, --fill and every --to-crs in one conversion, against the ground they show.
+/// Mosaics, --bbox, globes, --geoid, --fill and every --to-crs in one conversion, against the ground they show.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -276,7 +276,7 @@ TEST_F(GeographicCombinations, AGlobeHasNoSeamAtTheAntimeridian) {
   tolerance = 2.0 * 2.0 * 2.0 * 4000.0 * kDegree * kDegree / 8.0 + 0.1 + 0.05;
   fill_tolerance = 60.0;
   for (const auto& [box, fill, geoid] : kPairs) {
-    Combination at{"equirectangular", fill, geoid, {}, {"--wrap-x"}, "0.2"};
+    Combination at{"equirectangular", fill, geoid, {}, {}, "0.2"};
     if (box) at.box = {-180.0, -60.0, 180.0, 70.0};
     SCOPED_TRACE(std::string(box ? " bbox" : "") + (fill ? " fill" : "") + (geoid ? " geoid" : ""));
     ASSERT_NO_FATAL_FAILURE(convert(at));

@@ -321,7 +321,7 @@ TEST_F(CylindricalMoon, ThatGoesRoundIsOfferedNoRemedyThatIsRefused) {
   EXPECT_THAT(
       scale_warning(info, frame, request.projection),
       HasSubstr("a part of it (`bbox`) can be laid on a truer map by `projection` auto; `projection` none keeps"));
-  request.wrap_x = true;
+  request.wrap = Wrap::kAlways;
   EXPECT_THAT(
       error_of([&] { (void)make_source_frame(info, request); }).what(),
       HasSubstr("needs columns all the way round, 10916406.1527 of its map; this input's 437 columns 25000 apart "

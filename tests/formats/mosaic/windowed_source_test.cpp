@@ -86,8 +86,7 @@ TEST(ClosedSource, LeavesOutTheLastColumn) {
   GlobeSource whole;
   ClosedSource source(std::make_unique<GlobeSource>());
   EXPECT_EQ(source.info().width, 72);
-  EXPECT_EQ(source.info().warnings,
-            std::vector<Warning>{"memory: column 72 is the first one again, 360 degrees on, and is left out"});
+  EXPECT_TRUE(source.info().warnings.empty()) << "nothing is lost";
   EXPECT_EQ(read(source, {0, 0, 72, 37}), read(whole, {0, 0, 72, 37}));
 }
 

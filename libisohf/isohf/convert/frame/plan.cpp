@@ -237,6 +237,7 @@ TileShape shape_through_samples(const SourceFrame& frame, int levels) {
   std::optional<TileShape> best;
   double best_cost = 0.0;
   for (int cells = 1 << (levels - 1); cells <= std::max(128, 1 << (levels - 1)); cells *= 2) {
+    if (frame.wraps_x && frame.width % cells != 0) continue;
     const TileShape shape = TileShape::make(cells + 4, 2 * cells + 3, levels);
     const double cost = std::ceil(bounds.x1 / frame.spacing_x / cells) *
                         std::ceil(bounds.z1 / frame.spacing_z / cells) *
@@ -281,7 +282,11 @@ Lattice square_lattice(const SourceFrame& frame, const PlanRequest& request) {
   }
   std::int64_t columns = request.tiles ? request.tiles->first : 0;
   std::int64_t rows = request.tiles ? request.tiles->second : 0;
-  if (frame.wraps_x) {
+  if (frame.wraps_x && request.through_samples) {
+    columns = frame.width / shape.cell_columns();
+    rows = tiles_to_cover(bounds.z1, extent_z);
+    extent_x = bounds.x1 / static_cast<double>(columns);
+  } else if (frame.wraps_x) {
     // A whole number of tiles goes round.
     if (!request.tiles) columns = tiles_to_cover(std::max(bounds.x1 - extent_x / 2.0, 0.0), extent_x);
     extent_x = bounds.x1 / static_cast<double>(columns);
@@ -318,6 +323,7 @@ std::string density_warning(const SourceInfo& info, const Plan& plan, const Plan
 
 void check(const PlanRequest& request) {
   require_known("outside", request.outside, Outside::kVoid);
+  require_known("`wrap_x`", request.ground.wrap, Wrap::kAlways);
   require_known("`projection`", request.ground.projection.kind, ProjectionKind::kSystem);
   if (request.levels && (*request.levels < 1 || *request.levels > kMaxTileLevels)) {
     refuse(fmt::format("`levels` is {}, must be 1 to {}", *request.levels, kMaxTileLevels));
@@ -359,8 +365,8 @@ Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
                 fmt::format("{}: {}x{} samples, a surface needs at least 2x2", info.path, info.width, info.height));
   }
   const SourceFrame frame = make_source_frame(info, request.ground);
-  const bool is_moved = frame.warp || frame.wraps_x || request.fit;
-  if (request.through_samples && (is_moved || request.tiles || request.density || request.spacing)) {
+  const bool is_through = can_go_through_samples(frame, request);
+  if (request.through_samples && (!is_through || request.tiles || request.density || request.spacing)) {
     refuse(info.path +
            ": a lattice through the samples goes with none of `fit`, `wrap_x`, `density`, `spacing` and `tiles`, nor "
            "with a source "
@@ -388,6 +394,11 @@ Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
   plan.estimated_bytes = static_cast<std::uint64_t>(static_cast<double>(plan.lattice_samples) * kTypicalBits / 8.0 +
                                                     150.0 * static_cast<double>(plan.grid.tile_count()) + 20e3);
   return plan;
+}
+
+bool can_go_through_samples(const SourceFrame& frame, const PlanRequest& request) {
+  const int unit = 1 << (request.levels.value_or(kDefaultLevels) - 1);
+  return !frame.warp && !request.fit && (!frame.wraps_x || frame.width % unit == 0);
 }
 
 std::vector<std::string> plan_warnings(const SourceInfo& info, const Plan& plan, const PlanRequest& request) {

@@ -26,6 +26,9 @@ struct Plan {
 /// a constraint is answered with the nearest valid one. Sources of fewer than 2x2 samples are refused.
 [[nodiscard]] Plan make_plan(const SourceInfo& info, const PlanRequest& request);
 
+/// Whether every sample can be a vertex of equal tiles.
+[[nodiscard]] bool can_go_through_samples(const SourceFrame& frame, const PlanRequest& request);
+
 /// The shapes that suit a request without an input: the best by true aspect near the budget.
 [[nodiscard]] std::vector<TileShape> candidate_shapes(const PlanRequest& request, int limit);
 

@@ -143,14 +143,16 @@ void place_on_map(const SourceInfo& info, const GroundRequest& request, SourceFr
   const MapBounds bounds = bounds_of(info, frame.registration);
   frame.ground = ground_under(map, bounds);
   if (!is_asked) return;
-  if (request.wrap_x) refuse_request("and `wrap_x`, which needs the input's rows to stay rows: leave one of them out");
+  if (request.wrap == Wrap::kAlways)
+    refuse_request("and `wrap_x`, which needs the input's rows to stay rows: leave one of them out");
   if (!frame.ground)
     refuse_request("has no place for the input: its own map shows nothing there; leave the option out");
   const MapGround& ground = *frame.ground;
   if (asked.is_auto && ground.worst_error <= MapGround::kTrueEnough) return;
   const bool goes_round = ground.extent.east - ground.extent.west > 359.0;
-  const ProjectionChoice choice = choose_projection(asked, {info.path, info.georeference.system.body, map.ellipsoid(),
-                                                            ground.extent, goes_round, request.wrap_x, false});
+  const ProjectionChoice choice =
+      choose_projection(asked, {info.path, info.georeference.system.body, map.ellipsoid(), ground.extent, goes_round,
+                                request.wrap == Wrap::kAlways, false});
   const Projection projection(choice.spec);
   const ScaleError error = worst_scale_error(projection, map, bounds);
   if (asked.is_auto && error.worst >= ground.worst_error) return;
@@ -186,7 +188,7 @@ void place_degrees(const SourceInfo& info, const GroundRequest& request, SourceF
   }
   const Closure closure = closure_of(info);
   const ProjectionProblem problem{info.path, place.system.body,         ellipsoid_of(place.system),
-                                  ground,    closure != Closure::kOpen, request.wrap_x};
+                                  ground,    closure != Closure::kOpen, request.wrap == Wrap::kAlways};
   const ProjectionChoice choice = choose_projection(asked, problem);
   if (choice.spec.kind == ProjectionKind::kNone) return;
   if (choice.spec.kind != ProjectionKind::kEquirectangular) check_latitudes(info);
@@ -272,25 +274,24 @@ SourceFrame make_source_frame(const SourceInfo& info, const GroundRequest& reque
     frame.first_sample_x = frame.spacing_x / 2.0;
     frame.first_sample_z = frame.spacing_z / 2.0;
   }
-  if (request.wrap_x) {
-    const ReferenceMap* const map = request.source_map.get();
+  const ReferenceMap* const map = request.source_map.get();
+  const bool is_closed = closure_of(info, map) == Closure::kClosed;
+  // Without a place it is a pattern that goes on with its first column behind its last.
+  if (request.wrap == Wrap::kAlways && !is_closed && (place.has_origin || place.unit != HorizontalUnit::kUnknown)) {
     const std::optional<double> turn = turn_of_coordinates(info, map);
-    if (!turn && (place.has_origin || place.unit != HorizontalUnit::kUnknown)) {
+    if (!turn) {
       refuse_source(
           info.path +
           ": `wrap_x` joins columns of an input in degrees, on a map whose meridians are evenly spaced columns, or "
           "without a place; this one's are not; leave the option out, or bring it to degrees (gdalwarp)");
     }
-    // Without a place it is a pattern that goes on with its first column behind its last.
-    if (turn && closure_of(info, map) != Closure::kClosed) {
-      const bool in_degrees = place.unit == HorizontalUnit::kDegree;
-      refuse_source(fmt::format(
-          "{}: `wrap_x` needs columns all the way round, {}; this input's {} columns {:.12g} apart make {:.12g}",
-          info.path, in_degrees ? "360 degrees" : fmt::format("{:.12g} of its map", *turn), info.width, place.spacing_x,
-          static_cast<double>(info.width) * place.spacing_x));
-    }
-    frame.wraps_x = true;
+    const bool in_degrees = place.unit == HorizontalUnit::kDegree;
+    refuse_source(fmt::format(
+        "{}: `wrap_x` needs columns all the way round, {}; this input's {} columns {:.12g} apart make {:.12g}",
+        info.path, in_degrees ? "360 degrees" : fmt::format("{:.12g} of its map", *turn), info.width, place.spacing_x,
+        static_cast<double>(info.width) * place.spacing_x));
   }
+  frame.wraps_x = request.wrap == Wrap::kAlways || (request.wrap == Wrap::kAuto && is_closed);
   if (frame.projection) {
     // The middle of the source's rows and columns lies at the map's origin.
     const ProjectionSpec& spec = frame.projection->spec;
