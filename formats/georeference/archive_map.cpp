@@ -66,9 +66,10 @@ std::shared_ptr<const GridSystem> understand_grid_system(ArchiveReader& archive,
   if (own.system.semi_major_axis_m)
     ellipsoid = {*own.system.semi_major_axis_m, own.system.inverse_flattening.value_or(0.0)};
   try {
-    const WayToSystem way = find_way(own.system, text, ground, ellipsoid);
+    const SystemOnBody on = on_body_of(own.system, ellipsoid, text);
+    const WayToSystem way = find_way(own.system, on.text, ground, ellipsoid);
     SourceInfo there;
-    take_system(text, there);
+    take_system(on.text, there);
     if (way.is_ballpark) {
       warnings.push_back(loss(fmt::format(
           "{}: PROJ knows no way from its datum to that of \"{}\": they are taken for one, which may be off by some "

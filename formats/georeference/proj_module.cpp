@@ -387,6 +387,23 @@ void find_operation(const char* from, const char* to, const double* ground, Isoh
   isohf::put_text(found.pipeline, pipeline);
 }
 
+void put_on_body(const char* map, const char* body, const char* name, IsohfProjText& wkt) {
+  IsohfProjSystem source;
+  IsohfProjSystem target;
+  IsohfProjInfo info{};
+  open(body, "", source, info);
+  open(map, "", target, info);
+  PJ_CONTEXT* const context = target.context.get();
+  const Object geographic(proj_crs_get_geodetic_crs(context, source.horizontal.get()));
+  const Object moved(geographic ? proj_crs_alter_geodetic_crs(context, target.horizontal.get(), geographic.get())
+                                : nullptr);
+  const Object named(moved ? proj_alter_name(context, moved.get(), name) : nullptr);
+  const char* const one_line[] = {"MULTILINE=NO", nullptr};
+  const char* const text = named ? proj_as_wkt(context, named.get(), PJ_WKT2_2019, one_line) : nullptr;
+  if (text == nullptr || std::strlen(text) >= sizeof(wkt.text)) refuse("cannot be moved to another body by PROJ");
+  isohf::put_text(wkt.text, text);
+}
+
 void open_pipeline(const char* pipeline, IsohfProjSystem& system) {
   system.context = make_context();
   system.is_pipeline = true;
@@ -401,6 +418,10 @@ int module_find_operation(const char* from, const char* to, const double* ground
                           IsohfProjMessage* message) {
   return isohf::guarded(message, "PROJ", ErrorCode::kUnsupported,
                         [&] { find_operation(from, to, ground, *operation); });
+}
+
+int module_on_body(const char* map, const char* body, const char* name, IsohfProjText* wkt, IsohfProjMessage* message) {
+  return isohf::guarded(message, "PROJ", ErrorCode::kUnsupported, [&] { put_on_body(map, body, name, *wkt); });
 }
 
 int module_open_pipeline(const char* pipeline, IsohfProjSystem** system, IsohfProjMessage* message) {
@@ -522,8 +543,8 @@ const char* module_library() {
 }  // namespace
 
 extern "C" __attribute__((visibility("default"))) const IsohfProjModule* isohf_proj_module() {
-  static const IsohfProjModule module = {ISOHF_PROJ_ABI, module_open,   module_find_operation, module_open_pipeline,
-                                         module_wkt,     module_same,   module_to_geo,         module_from_geo,
-                                         module_close,   module_library};
+  static const IsohfProjModule module = {ISOHF_PROJ_ABI,       module_open,  module_find_operation, module_on_body,
+                                         module_open_pipeline, module_wkt,   module_same,           module_to_geo,
+                                         module_from_geo,      module_close, module_library};
   return &module;
 }

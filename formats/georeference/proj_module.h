@@ -12,7 +12,7 @@
 extern "C" {
 
 /// Raised whenever anything below changes; the loader refuses any other.
-#define ISOHF_PROJ_ABI 4
+#define ISOHF_PROJ_ABI 5
 
 typedef struct IsohfProjSystem IsohfProjSystem;
 
@@ -51,6 +51,10 @@ typedef struct IsohfProjOperation {
   int32_t is_ballpark;  ///< no relation of the datums is known: they are taken for one
 } IsohfProjOperation;
 
+typedef struct IsohfProjText {
+  char text[8192];
+} IsohfProjText;
+
 /// Understands `text`: "EPSG:2154", WKT of any version and dialect, a PROJ string, PROJJSON. `vertical`, where it is not
 /// empty, is the system of the heights of a `text` that says nothing of them.
 typedef int (*IsohfProjOpen)(const char* text, const char* vertical, IsohfProjSystem** system, IsohfProjInfo* info,
@@ -59,6 +63,9 @@ typedef int (*IsohfProjOpen)(const char* text, const char* vertical, IsohfProjSy
 /// `from` to the system `to`, of those that need no grid that is not installed.
 typedef int (*IsohfProjFindOperation)(const char* from, const char* to, const double* ground,
                                       IsohfProjOperation* operation, IsohfProjMessage* message);
+/// The projection of the projected system `map` on the body of the system `body`, as WKT2 called `name`.
+typedef int (*IsohfProjOnBody)(const char* map, const char* body, const char* name, IsohfProjText* wkt,
+                               IsohfProjMessage* message);
 /// Such a pipeline again, as a system that can be moved by and closed, and nothing else.
 typedef int (*IsohfProjOpenPipeline)(const char* pipeline, IsohfProjSystem** system, IsohfProjMessage* message);
 /// The text of all of the system, on one line: WKT2 (ISO 19162:2019), WKT1 as GDAL writes it, ESRI's WKT1.
@@ -71,19 +78,20 @@ typedef int (*IsohfProjSame)(const IsohfProjSystem* a, const IsohfProjSystem* b)
 typedef void (*IsohfProjMove)(const IsohfProjSystem* system, double* places, size_t count);
 typedef void (*IsohfProjClose)(IsohfProjSystem* system);
 /// "PROJ 9.1.1"; stays valid.
-typedef const char* (*IsohfProjText)(void);
+typedef const char* (*IsohfProjVersion)(void);
 
 typedef struct IsohfProjModule {
   int32_t abi;
   IsohfProjOpen open;
   IsohfProjFindOperation find_operation;
+  IsohfProjOnBody on_body;
   IsohfProjOpenPipeline open_pipeline;
   IsohfProjWkt wkt;
   IsohfProjSame same;
   IsohfProjMove to_geo;
   IsohfProjMove from_geo;
   IsohfProjClose close;
-  IsohfProjText library;
+  IsohfProjVersion library;
 } IsohfProjModule;
 
 /// The one symbol that the module exports, and its name.

@@ -300,7 +300,7 @@ std::shared_ptr<const ReferenceMap> understand_way(const MappedSystem& system, c
 namespace {
 
 /// What names the datum of a source's longitudes and latitudes: its system, else its ellipsoid, else WGS 84.
-std::string datum_text(const ReferenceSystem& system) {
+std::string datum_text(const ReferenceSystem& system, const std::optional<Ellipsoid>& ellipsoid = std::nullopt) {
   if (std::string text = system_text(system); !text.empty()) {
     // PROJ takes unknown datums of two ellipsoids for one, silently, where their meridians have one name.
     for (const std::string_view of_bodies : {"PRIMEM[\"Reference_Meridian\"", "PRIMEM[\"Reference meridian\""}) {
@@ -309,10 +309,12 @@ std::string datum_text(const ReferenceSystem& system) {
     }
     return text;
   }
-  if (!system.semi_major_axis_m) return "EPSG:4326";
-  const double inverse = system.inverse_flattening.value_or(0.0);
-  return inverse > 0.0 ? fmt::format("+proj=longlat +a={} +rf={}", *system.semi_major_axis_m, inverse)
-                       : fmt::format("+proj=longlat +R={}", *system.semi_major_axis_m);
+  if (!system.semi_major_axis_m && !ellipsoid) return "EPSG:4326";
+  const double radius = system.semi_major_axis_m ? *system.semi_major_axis_m : ellipsoid->semi_major_axis_m;
+  const double inverse =
+      system.semi_major_axis_m ? system.inverse_flattening.value_or(0.0) : ellipsoid->inverse_flattening;
+  return inverse > 0.0 ? fmt::format("+proj=longlat +a={} +rf={}", radius, inverse)
+                       : fmt::format("+proj=longlat +R={}", radius);
 }
 
 /// The ground of a source that says where it lies, for the choice among ways between datums.
@@ -350,6 +352,41 @@ void require_same_heights(const ReferenceSystem& from, const UnderstoodSystem::D
 
 }  // namespace
 
+SystemOnBody on_body_of(const ReferenceSystem& raster, const Ellipsoid& ellipsoid, const std::string& text) {
+  constexpr double kSameBody = 0.01;  // of radii
+  constexpr double kEarthRadius = 6378137.0;
+  const auto understood = understand_system(text);
+  const UnderstoodSystem::Description& map = understood->description();
+  const auto is_near = [](double radius, double other) { return std::abs(radius / other - 1.0) < kSameBody; };
+  if (is_near(map.ellipsoid.semi_major_axis_m, ellipsoid.semi_major_axis_m)) return {text};
+  const auto name_of = [](const std::string& name, double radius) {
+    return name.empty() ? fmt::format("a body of radius {:.8g} m", radius) : name;
+  };
+  const std::string body = name_of(raster.body.empty() ? body_of("", ellipsoid.semi_major_axis_m) : raster.body,
+                                   ellipsoid.semi_major_axis_m);
+  // UTM zones are the Earth's.
+  bool states_body = !is_near(map.ellipsoid.semi_major_axis_m, kEarthRadius) || map.authority.starts_with("IAU") ||
+                     map.name.find("UTM zone") != std::string::npos;
+  for (const char* parameter : {"+R=", "+a=", "+b=", "+rf=", "+ellps=", "+datum="})
+    states_body = states_body || text.find(parameter) != std::string::npos;
+  const std::string name = shown_name(map.name, text);
+  if (!map.is_projected || states_body) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("\"{}\" is of {}, the input of {}; name a map of that body, or a projection without a body "
+                            "(ESRI:54009, +proj=moll)",
+                            name,
+                            name_of(body_of(map.name + ' ' + map.datum, map.ellipsoid.semi_major_axis_m),
+                                    map.ellipsoid.semi_major_axis_m),
+                            body));
+  }
+  IsohfProjText wkt{};
+  IsohfProjMessage message{};
+  const int result = proj_module().on_body(text.c_str(), datum_text(raster, ellipsoid).c_str(),
+                                           fmt::format("{} on {}", name, body).c_str(), &wkt, &message);
+  if (result != 0) throw Error(module_error_code(result), fmt::format("\"{}\" {}", name, message.text));
+  return {wkt.text, body};
+}
+
 WayToSystem find_way(const ReferenceSystem& from, const std::string& to, const GeoExtent& ground,
                      const Ellipsoid& ellipsoid) {
   const auto understood = understand_system(to);
@@ -384,7 +421,9 @@ void understand_projection(const SourceInfo& info, const ReferenceMap* source_ma
     } else if (source_map != nullptr) {
       spec.ellipsoid = source_map->ellipsoid();
     }
-    const WayToSystem way = find_way(own, request.system, rough_ground(info, source_map), spec.ellipsoid);
+    const SystemOnBody on = on_body_of(own, spec.ellipsoid, request.system);
+    request.system_body = on.body;
+    const WayToSystem way = find_way(own, on.text, rough_ground(info, source_map), spec.ellipsoid);
     spec.system = way.system;
     if (!way.is_projected) {
       throw Error(ErrorCode::kInvalidArgument,

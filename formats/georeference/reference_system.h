@@ -49,6 +49,18 @@ class UnderstoodSystem : public ReferenceMap {
 [[nodiscard]] std::shared_ptr<const ReferenceMap> understand_map(const std::string& text,
                                                                  std::optional<double> metres_per_unit);
 
+/// A system, and the body that it was moved to.
+struct SystemOnBody {
+  std::string text;
+  std::string body = {};  ///< "Mars"; empty: it was not moved
+};
+
+/// `text`, or its projection on the body that a raster is of, whose `ellipsoid` is given: codes and PROJ strings that
+/// state no body are of the Earth only for want of another. Throws Error{kInvalidArgument} if `text` states another
+/// body, or is not a map; else as understand_system.
+[[nodiscard]] SystemOnBody on_body_of(const ReferenceSystem& raster, const Ellipsoid& ellipsoid,
+                                      const std::string& text);
+
 /// A way from the longitudes and latitudes of one reference system to the coordinates of another.
 struct WayToSystem {
   MappedSystem system;

@@ -359,9 +359,10 @@ class Joining {
     return code ? fmt::format("EPSG:{}", *code) : projection_wkt(spec, "");
   }
 
-  /// Has the whole lie in the system `target`, and says how the members of each system come there.
-  [[nodiscard]] std::vector<std::shared_ptr<const MosaicWay>> ways_to(const std::string& target,
+  /// Has the whole lie in `system`, and says how the members of each system come there.
+  [[nodiscard]] std::vector<std::shared_ptr<const MosaicWay>> ways_to(const std::string& system,
                                                                       SourceInfo& whole) const {
+    const std::string target = on_body_of(systems_[0].system, ellipsoid(0), system).text;
     std::vector<std::shared_ptr<const MosaicWay>> ways(systems_.size());
     SourceInfo there;
     take_system(target, there);

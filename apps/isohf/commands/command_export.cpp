@@ -538,6 +538,7 @@ int run(const ExportOptions& options) {
   } else if (!options.common.quiet) {
     std::string what = fmt::format("{} x {} samples of {}, {:.6g} x {:.6g} apart", samples.width, samples.height,
                                    to_string(mapping.type), samples.spacing_x, samples.spacing_z);
+    if (samples.system) what += ", in " + samples.system->place.system.name;
     if (exporter.files > 1) {
       what +=
           fmt::format(", in {} x {} files of {} x {}", grid.cut.across, grid.cut.down, grid.cut.columns, grid.cut.rows);

@@ -104,6 +104,7 @@ struct ProjectionRequest {
   bool is_given = false;           ///< by the user: an input on a map of its own leaves it for nothing else
   std::string system;              ///< of kind system, as the user has it
   ProjectionSpec system_map;       ///< the same, once it is understood for the input: understand_ground()
+  std::string system_body;         ///< the input's, if the system is a projection that was moved there from the Earth
   std::string system_note;         ///< what a user must hear of the way there, one line; mostly empty
 
   /// "auto", "KIND", "KIND:PARAMETERS" or a reference system: local:LON,LAT  transverse-mercator:LON[,SCALE]  utm:32N

@@ -65,7 +65,9 @@ class Choice {
     if (request_.kind == Kind::kNone) return {{}, {}, "asked for: world units are degrees"};
     const ProjectionSpec spec = specify(request_.kind);
     if (const std::string fault = fault_of(spec); !fault.empty()) refuse(fault);
-    return {spec, worst_scale_error(Projection(spec), ground_), "asked for"};
+    return {spec, worst_scale_error(Projection(spec), ground_),
+            request_.system_body.empty() ? "asked for"
+                                         : "asked for, with " + request_.system_body + " in place of the Earth"};
   }
 
  private:
@@ -246,11 +248,11 @@ class Choice {
     if (has_flat && problem_.goes_round && !(is_on_one_side(ground_) && nearest >= kCapLatitude)) {
       return flat_because("the input goes all the way round");
     }
-    std::optional<ProjectionChoice> best;
-    for (const Kind kind : {Kind::kLambertConformal, Kind::kTransverseMercator, Kind::kPolarStereographic}) {
     if (has_flat && problem_.wraps_x) {
       return flat_because("--wrap-x needs the input's rows to stay rows");  // NOLINT: as archives have recorded it
     }
+    std::optional<ProjectionChoice> best;
+    for (const Kind kind : {Kind::kLambertConformal, Kind::kTransverseMercator, Kind::kPolarStereographic}) {
       const ProjectionSpec spec = specify_freely(kind);
       if (!fault_of(spec).empty()) continue;
       const ScaleError error = worst_scale_error(Projection(spec), ground_);
