@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cctype>
 
@@ -10,30 +9,6 @@
 
 namespace isohf {
 namespace {
-
-struct UnitRow {
-  int epsg = 0;
-  const char* name = "";
-  double metres = 1.0;
-  std::array<std::string_view, 8> spellings = {};  // lower case
-};
-
-// EPSG dataset, table of units of measure; the US survey foot is 1200/3937 m by definition.
-constexpr std::array<UnitRow, 10> kUnits = {{
-    {9001, "metre", 1.0, {"m", "metre", "meter", "metres", "meters", "mtr"}},
-    {9002, "foot", 0.3048, {"ft", "foot", "feet", "international foot", "international feet", "foot_international"}},
-    {9003,
-     "US survey foot",
-     1200.0 / 3937.0,
-     {"ftus", "us-ft", "us_ft", "us survey foot", "us survey feet", "foot_us", "us_survey_foot", "us_survey_feet"}},
-    {9036, "kilometre", 1000.0, {"km", "kilometre", "kilometer", "kilometres", "kilometers", ""}},
-    {9030, "nautical mile", 1852.0, {"nm", "nautical mile", "nautical miles", "", "", ""}},
-    {9093, "statute mile", 1609.344, {"mi", "statute mile", "mile", "miles", "", ""}},
-    {9096, "yard", 0.9144, {"yd", "yard", "yards", "", "", ""}},
-    {9014, "fathom", 1.8288, {"fathom", "fathoms", "", "", "", ""}},
-    {1033, "centimetre", 0.01, {"cm", "centimetre", "centimeter", "centimetres", "centimeters", ""}},
-    {1025, "millimetre", 0.001, {"mm", "millimetre", "millimeter", "millimetres", "millimeters", ""}},
-}};
 
 struct BodyRow {
   const char* name;
@@ -75,35 +50,6 @@ bool has_word(const std::string& text, const std::string& word) {
 }
 
 }  // namespace
-
-std::optional<LinearUnit> linear_unit(int epsg) {
-  for (const UnitRow& row : kUnits) {
-    if (row.epsg == epsg) return LinearUnit{row.name, row.metres};
-  }
-  return std::nullopt;
-}
-
-std::optional<LinearUnit> linear_unit(std::string_view name) {
-  const std::string wanted = lower_case(name);
-  if (wanted.empty()) return std::nullopt;
-  for (const UnitRow& row : kUnits) {
-    if (std::find(row.spellings.begin(), row.spellings.end(), wanted) != row.spellings.end()) {
-      return LinearUnit{row.name, row.metres};
-    }
-  }
-  return std::nullopt;
-}
-
-std::string linear_unit_name(double metres) {
-  const auto known = std::ranges::find(kUnits, metres, &UnitRow::metres);
-  return known == kUnits.end() ? "unit" : known->name;
-}
-
-double world_per_elevation(const Metadata& metadata) {
-  if (metadata.horizontal_unit != "metre" && metadata.source.crs_unit != "degree") return 1.0;
-  const auto unit = linear_unit(metadata.vertical_unit);
-  return unit ? unit->metres : 1.0;
-}
 
 std::string gdal_unit(const std::string& name, bool has_vertical_code) {
   const bool is_short = !has_vertical_code && (name == "metre" || name == "foot");

@@ -4,29 +4,10 @@
 #include <string>
 #include <string_view>
 
-#include "isohf/metadata.h"
+#include "isohf/projection/length_unit.h"
 #include "isohf/raster.h"
 
 namespace isohf {
-
-/// A unit of length.
-struct LinearUnit {
-  std::string name;     ///< "metre", "foot", "US survey foot", ...
-  double metres = 1.0;  ///< metres in one unit
-};
-
-/// By EPSG unit code (9001 is the metre); nullopt for a code that isohf does not know.
-[[nodiscard]] std::optional<LinearUnit> linear_unit(int epsg);
-
-/// By the name or abbreviation that files use, in any case: "m", "Meters", "ft", "ftUS", ...; nullopt for any other
-/// text.
-[[nodiscard]] std::optional<LinearUnit> linear_unit(std::string_view name);
-
-/// What a length of so many metres is called; "unit" where it has no name.
-[[nodiscard]] std::string linear_unit_name(double metres);
-
-/// World units of one elevation unit of an archive, whose degrees are drawn as metres; 1 where either is not known.
-[[nodiscard]] double world_per_elevation(const Metadata& metadata);
 
 /// What GDAL calls the unit of a band's heights that linear_unit() has named: "m", "ft", else the name; where a code says what
 /// heights are above, by that system's.

@@ -18,6 +18,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import zlib
 
 BIN = pathlib.Path(sys.argv[1]).resolve()
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
@@ -165,3 +166,32 @@ def sample(archive, places, *options):
     """The first number (the elevation) that `isohf sample` prints for each (x, y) of `places`; NaN outside and in nodata."""
     lines = "".join(f"{x!r} {y!r}\n" for x, y in places)
     return [numbers[0] for numbers in isohf("sample", archive, *options, stdin=lines).numbers()]
+
+
+def read_png(name):
+    """Columns, rows, channels, and the bytes of a PNG of 8 bits, row by row."""
+    content = (FOLDER / name).read_bytes()
+    at, packed = 8, b""
+    while at < len(content):
+        length, kind = struct.unpack(">L4s", content[at:at + 8])
+        body = content[at + 8:at + 8 + length]
+        if kind == b"IHDR":
+            columns, rows, depth, colour = struct.unpack(">LLBB", body[:10])
+        if kind == b"IDAT":
+            packed += body
+        at += 12 + length
+    check(depth == 8 and colour in (0, 2, 4, 6), f"{name}: not 8 bits without a palette")
+    channels = {0: 1, 2: 3, 4: 2, 6: 4}[colour]
+    data, line = zlib.decompress(packed), columns * channels
+    above, pixels = bytearray(line), bytearray()
+    for start in range(0, rows * (line + 1), line + 1):
+        way, here = data[start], bytearray(data[start + 1:start + 1 + line])
+        for i in range(line):
+            west = here[i - channels] if i >= channels else 0
+            corner = above[i - channels] if i >= channels else 0
+            p = west + above[i] - corner
+            paeth = min((west, above[i], corner), key=lambda value: abs(p - value))
+            here[i] = (here[i] + (0, west, above[i], (west + above[i]) // 2, paeth)[way]) & 255
+        pixels += here
+        above = here
+    return columns, rows, channels, pixels

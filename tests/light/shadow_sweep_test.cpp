@@ -180,7 +180,7 @@ class ShadowsOfAnySun : public testing::Test {
     std::vector<SunSample> light(points.size());
     std::vector<double> heights(points.size());
     Surface surface(archive);
-    surface.sample(points, {azimuth, elevation, {}, 1.0}, 0.0, std::span(light));
+    surface.sample(points, {azimuth, elevation, {}}, 0.0, std::span(light));
     surface.sample(points, std::span(heights));
     std::vector<int> lit;
     for (std::size_t i = 0; i < light.size(); ++i) {

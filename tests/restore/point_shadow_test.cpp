@@ -101,7 +101,7 @@ TEST_P(PointShadow, IsTheSweepsAtVerticesWithTheSunInTheWest) {
   const TileGrid& grid = archive.grid();
   const TileShape& shape = grid.shape();
   Surface surface(archive);
-  const Sun sun{270.0, 12.0, {}, 1.0};
+  const Sun sun{270.0, 12.0, {}};
   const double fall = std::tan(12.0 * std::numbers::pi / 180.0);
   const WorldBounds& ground = archive.metadata().valid;
   int compared = 0;
@@ -137,7 +137,7 @@ TEST_P(PointShadow, SharesFollowEquation16AboveTheSurfaceAndItsDoubleOnIt) {
   const std::vector<WorldPoint> points = places();
   std::vector<double> heights(points.size());
   surface.sample(points, std::span(heights));
-  const Sun sun{200.0, 8.0, 3.0, 1.0};
+  const Sun sun{200.0, 8.0, 3.0};
   double lit = 0.0;
   for (const double above : {0.0, 1e-3, 0.5, 4.0, 30.0, 80.0}) {
     std::vector<SunSample> found(points.size());
@@ -167,7 +167,7 @@ TEST_P(PointShadow, SharesFollowEquation16AboveTheSurfaceAndItsDoubleOnIt) {
 TEST_P(PointShadow, DoesNotDependOnThreadsOrMemory) {
   const ArchiveReader archive(folder / "a.isohf");
   const std::vector<WorldPoint> points = places();
-  const Sun sun{123.0, 5.0, {}, 1.0};
+  const Sun sun{123.0, 5.0, {}};
   std::vector<SunSample> first(points.size());
   Surface(archive).sample(points, sun, 2.0, first);
   for (const int threads : {1, 5}) {
@@ -186,8 +186,8 @@ TEST_P(PointShadow, RefusesSunsAndHeightsOutOfRange) {
   const WorldPoint at{5.0, 5.0};
   SunSample found{};
   const double nan = std::nan("");
-  for (const Sun& sun : {Sun{nan, 5.0, {}, 1.0}, Sun{0.0, 0.0, {}, 1.0}, Sun{0.0, 90.0, {}, 1.0},
-                         Sun{0.0, nan, {}, 1.0}, Sun{0.0, 5.0, 0.0, 1.0}, Sun{0.0, 5.0, {}, 0.0}}) {
+  for (const Sun& sun :
+       {Sun{nan, 5.0, {}}, Sun{0.0, 0.0, {}}, Sun{0.0, 90.0, {}}, Sun{0.0, nan, {}}, Sun{0.0, 5.0, 0.0}}) {
     EXPECT_THROW(surface.sample({&at, 1}, sun, 0.0, {&found, 1}), Error);
   }
   for (const double above : {-1.0, nan, std::numeric_limits<double>::infinity()}) {

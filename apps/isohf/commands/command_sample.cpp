@@ -10,11 +10,9 @@
 
 #include "commands/command.h"
 #include "commands/line_reader.h"
-#include "formats/georeference/units.h"
 #include "input/quantities.h"
 #include "isohf/archive.h"
 #include "isohf/error.h"
-#include "isohf/restore/ground_scale.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
 #include "options/option_values.h"
@@ -36,7 +34,8 @@ start with # are passed over. For each place one line is printed:
   elevation nx ny nz tile_column tile_row
 
 The elevation is that of the triangle there, as it is drawn; the normal (x, y up, z) is the vertex normals'
-blend over it, of length 1. A place without elevation gives 'void', one beyond the tiles 'outside'.
+blend over it, of length 1. Heights and lengths count in metres if their units are known. A place without
+elevation gives 'void', one beyond the tiles 'outside'.
 
 With --shadow two numbers follow: the elevation up to which the surface's shadow reaches there, and the share of the
 sun that is seen, 0 to 1, from the surface or from --above it. Nothing is swept: the line to the sun is followed over
@@ -221,9 +220,6 @@ class Answers {
   void answer() {
     std::vector<SurfaceSample> samples(places_.size());
     surface_.sample(places_, std::span(samples));
-    if (options_.sun.elevation_units_per_world_unit != 1.0) {
-      for (SurfaceSample& sample : samples) stand_in_metres(sample.normal);
-    }
     std::vector<SunSample> suns(options_.with_shadow ? places_.size() : 0);
     if (options_.with_shadow) surface_.sample(places_, options_.sun, options_.above, suns);
     std::vector<std::string> texts((samples.size() + kPlacesOfText - 1) / kPlacesOfText);
@@ -237,13 +233,6 @@ class Answers {
     });
     for (const std::string& text : texts) out_.write(text);
     places_.clear();
-  }
-
-  /// Of ground whose heights and lengths both are metres.
-  void stand_in_metres(std::array<double, 3>& normal) const {
-    normal[1] *= options_.sun.elevation_units_per_world_unit;
-    const double length = std::hypot(normal[0], normal[1], normal[2]);
-    for (double& part : normal) part /= length;
   }
 
   const SampleOptions& options_;
@@ -291,14 +280,6 @@ WorldGeoreference places_of(ArchiveReader& archive, bool needs_geo, bool needs_s
 
 int run(SampleOptions options) {
   ArchiveReader archive = open_archive(options.archive);
-  const Metadata& metadata = archive.metadata();
-  options.sun.elevation_units_per_world_unit = 1.0 / world_per_elevation(metadata);
-  if (options.with_shadow && is_in_degrees(metadata)) {
-    throw Error(ErrorCode::kInvalidArgument,
-                archive.path() +
-                    ": is laid out in degrees, along which no shadow has a length; convert its source with "
-                    "--to-crs auto for --shadow");
-  }
   print_warnings(archive.warnings());
   const bool takes_geo = options.reads_degrees || !options.geo_places.empty();
   const bool takes_source = options.reads_source || !options.source_places.empty();

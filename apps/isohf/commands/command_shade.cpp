@@ -10,7 +10,6 @@
 #include <optional>
 
 #include "commands/command.h"
-#include "formats/georeference/units.h"
 #include "formats/io/text.h"
 #include "formats/write/raster_sink.h"
 #include "input/quantities.h"
@@ -208,7 +207,6 @@ int run(ShadeCommand options) {
   if (!common.quiet) tell_flat_relief(metadata, request);
   const GridSize size = request.size.value_or(shade_size(archive, options.longest));
   request.size = size;
-  request.elevation_units_per_world_unit = 1.0 / world_per_elevation(archive.metadata());
   request.floats = lower_case(std::filesystem::path(options.output).extension().string()) == ".exr";
   const ShadeSamples samples = shade_samples(request);
 

@@ -9,7 +9,6 @@
 #include <mutex>
 #include <optional>
 
-#include "formats/georeference/units.h"
 #include "isohf/archive.h"
 #include "isohf/archive/textures/texture_reader.h"
 #include "isohf/base/assert.h"
@@ -45,7 +44,7 @@ class ArchiveSource final : public TileSource {
       : reader_(name.empty() ? ArchiveReader(path) : ArchiveReader(open_file_source(path), name)),
         ground_scale_(isohf::ground_scale(reader_.metadata())),
         grid_(scaled(reader_.grid(), ground_scale_)),
-        world_per_elevation_(isohf::world_per_elevation(reader_.metadata())) {
+        world_per_elevation_(ground_scale_.elevation) {
     const Metadata& metadata = reader_.metadata();
     if (metadata.planes.count > 0) {
       planes_.emplace(grid_, metadata.planes.stride, metadata.planes.count, metadata.wraps_x);

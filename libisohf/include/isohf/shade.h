@@ -87,7 +87,6 @@ struct ShadeOptions {
   std::optional<double> softness;
   std::optional<ShadePalette> palette;  ///< nullopt: its body's
   bool texture = false;                 ///< the archive's textures where it has them, over the palette's colours
-  double elevation_units_per_world_unit = 1.0;  ///< feet for one metre, say; > 0
   /// Samples are floats: linear light with premultiplied alpha, or shares from 0 to 1, NaN where there is no elevation.
   bool floats = false;
 };

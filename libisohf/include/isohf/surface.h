@@ -76,9 +76,10 @@ enum class SurfaceState : std::uint8_t { kSurface, kNodata, kOutside };
 /// The surface at one point.
 struct SurfaceSample {
   SurfaceState state = SurfaceState::kOutside;
-  TileIndex tile{-1, -1};                          ///< under the point; (-1, -1) outside
-  double elevation = 0.0;                          ///< of the triangle there, as it is drawn; kSurface alone
-  std::array<double, 3> normal = {0.0, 1.0, 0.0};  ///< x East, y up, z South, of length 1: vertex normals, blended
+  TileIndex tile{-1, -1};  ///< under the point; (-1, -1) outside
+  double elevation = 0.0;  ///< of the triangle there, as it is drawn; kSurface alone
+  /// x East, y up, z South, of length 1: vertex normals, blended. Heights and lengths are metres if their units are known.
+  std::array<double, 3> normal = {0.0, 1.0, 0.0};
 };
 
 /// A sun so far away that its light comes from one direction everywhere.
@@ -88,7 +89,6 @@ struct Sun {
   /// One size k of the sun at all distances, elevation units, > 0 (paper Eq. 16); nullopt: its disc, as wide as it is
   /// seen from the archive's body.
   std::optional<double> softness;
-  double elevation_units_per_world_unit = 1.0;  ///< feet for one metre, say; > 0
 };
 
 /// How the sun shines at a point of the surface, or above it. NaN where the surface has no elevation.

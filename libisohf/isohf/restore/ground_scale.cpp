@@ -5,19 +5,21 @@
 #include <cmath>
 #include <numbers>
 
-namespace isohf {
+#include "isohf/projection/length_unit.h"
 
-bool is_in_degrees(const Metadata& metadata) {
-  return metadata.horizontal_unit != "metre" && metadata.source.crs_unit == "degree";
-}
+namespace isohf {
 
 GroundScale ground_scale(const Metadata& metadata) {
   const SourceRecord& source = metadata.source;
-  if (!is_in_degrees(metadata) || !source.origin_y) return {};
+  const bool in_metres = metadata.horizontal_unit == "metre";
+  if (!in_metres && source.crs_unit != "degree") return {};
+  const auto unit = linear_unit(metadata.vertical_unit);
+  const double elevation = unit ? unit->metres : 1.0;
+  if (in_metres || !source.origin_y) return {1.0, 1.0, elevation};
   const double degree = std::numbers::pi / 180.0;
   const double middle = *source.origin_y - 0.5 * static_cast<double>(source.height - 1) * source.crs_spacing_y;
   const double length = degree * source.semi_major_axis_m.value_or(Ellipsoid{}.semi_major_axis_m);
-  return {length * std::max(std::cos(middle * degree), 0.01), length};
+  return {length * std::max(std::cos(middle * degree), 0.01), length, elevation};
 }
 
 double ground_distance_m(const Metadata& metadata, GeoPoint from, GeoPoint to) {

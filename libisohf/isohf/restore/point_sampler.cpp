@@ -30,26 +30,27 @@ struct Run {
 /// One tile's surface, from its codes.
 class TileSurface {
  public:
+  /// grid_m   whose lengths are metres; metres are those in one elevation unit
   /// scratch  nothing, or C*R heights of any value
-  TileSurface(const TileGrid& grid, const Quantisation& quantisation, const TileCodes& codes,
+  TileSurface(const TileGrid& grid_m, double metres, const Quantisation& quantisation, const TileCodes& codes,
               std::vector<float>& scratch)
-      : grid_(grid), quantisation_(quantisation), codes_(codes), scratch_(scratch) {}
+      : grid_m_(grid_m), metres_(metres), quantisation_(quantisation), codes_(codes), scratch_(scratch) {}
 
   [[nodiscard]] double elevation(const Barycentric& where) const {
-    return isohf::elevation_at(grid_.shape(), codes_, quantisation_, where);
+    return isohf::elevation_at(grid_m_.shape(), codes_, quantisation_, where);
   }
 
   void sample(ObjectPoint point, SurfaceSample& sample) {
-    const Barycentric where = snapped(barycentric(grid_.shape(), point));
+    const Barycentric where = snapped(barycentric(grid_m_.shape(), point));
     sample.elevation = elevation(where);
     sample.state = std::isnan(sample.elevation) ? SurfaceState::kNodata : SurfaceState::kSurface;
     if (sample.state == SurfaceState::kNodata) return;
     fill_around(where);
-    const View2D<const float> heights(scratch_.data(), grid_.shape().columns(), grid_.shape().rows());
+    const View2D<const float> heights(scratch_.data(), grid_m_.shape().columns(), grid_m_.shape().rows());
     std::array<double, 3> sum{};
     for (std::size_t i = 0; i < 3; ++i) {
       if (where.weights[i] <= 0.0) continue;
-      const Normal normal = vertex_normal(grid_, heights, where.vertices[i]);
+      const Normal normal = vertex_normal(grid_m_, heights, where.vertices[i]);
       sum[0] += where.weights[i] * static_cast<double>(normal.x);
       sum[1] += where.weights[i] * static_cast<double>(normal.y);
       sum[2] += where.weights[i] * static_cast<double>(normal.z);
@@ -61,7 +62,7 @@ class TileSurface {
 
  private:
   [[nodiscard]] std::size_t at(GridVertex vertex) const {
-    return static_cast<std::size_t>(vertex.row) * static_cast<std::size_t>(grid_.shape().columns()) +
+    return static_cast<std::size_t>(vertex.row) * static_cast<std::size_t>(grid_m_.shape().columns()) +
            static_cast<std::size_t>(vertex.column);
   }
 
@@ -73,23 +74,24 @@ class TileSurface {
     return datum_;
   }
 
-  /// Heights above the datum of all vertices that the normals of a triangle's vertices depend on: single precision is
+  /// Metres above the datum, of all vertices that the normals of a triangle's vertices depend on: single precision is
   /// enough for differences.
   void fill_around(const Barycentric& where) {
     const auto& [g, h, i] = where.vertices;
     const int first_row = std::min(g.row, h.row) - 1;
     const int last_row = std::max(g.row, h.row) + 1;
     const int first_column = std::max(std::min(g.column, h.column) - 1, 0);
-    const int last_column = std::min(std::max(h.column, i.column) + 2, grid_.shape().columns() - 1);
+    const int last_column = std::min(std::max(h.column, i.column) + 2, grid_m_.shape().columns() - 1);
     for (int row = first_row; row <= last_row; ++row) {
       for (int column = first_column; column <= last_column; ++column) {
         const std::size_t vertex = at({column, row});
-        scratch_[vertex] = static_cast<float>(elevation_at(vertex) - datum());
+        scratch_[vertex] = static_cast<float>((elevation_at(vertex) - datum()) * metres_);
       }
     }
   }
 
-  const TileGrid& grid_;
+  const TileGrid& grid_m_;
+  double metres_;
   const Quantisation& quantisation_;
   const TileCodes& codes_;
   std::vector<float>& scratch_;
@@ -124,8 +126,12 @@ void for_each_tile(const ReadTile& read_tile, TileIndex first, std::int64_t tile
 }
 
 PointSampler::PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile,
-                           std::uint64_t memory_bytes)
-    : grid_(grid), quantisation_(quantisation), read_tile_(std::move(read_tile)) {
+                           std::uint64_t memory_bytes, const GroundScale& scale)
+    : grid_(grid),
+      grid_m_(scaled(grid, scale)),
+      metres_(scale.elevation),
+      quantisation_(quantisation),
+      read_tile_(std::move(read_tile)) {
   const std::uint64_t bytes = quantisation.type == CodeType::kF32 ? 4 : 2;
   const std::uint64_t tile_bytes = static_cast<std::uint64_t>(grid.shape().stored_vertex_count()) * bytes;
   capacity_ = static_cast<std::size_t>(std::max<std::uint64_t>(1, memory_bytes / tile_bytes));
@@ -197,7 +203,7 @@ void PointSampler::sample(std::span<const WorldPoint> points, std::span<SurfaceS
       [&] { return std::vector<float>(static_cast<std::size_t>(grid_.shape().stored_vertex_count())); });
   const auto tile_of = [&](std::size_t i) { return tile_under(points[i]); };
   visit(points.size(), tile_of, [&](const TileCodes& codes, std::span<const Run> runs) {
-    TileSurface surface(grid_, quantisation_, codes, scratches.local());
+    TileSurface surface(grid_m_, metres_, quantisation_, codes, scratches.local());
     for (const Run& run : runs) {
       for (std::size_t i = run.first; i < run.end; ++i) {
         const TilePoint at = grid_.locate(points[i]);
@@ -214,7 +220,7 @@ void PointSampler::sample(std::span<const WorldPoint> points, std::span<double> 
   const auto tile_of = [&](std::size_t i) { return tile_under(points[i]); };
   visit(points.size(), tile_of, [&](const TileCodes& codes, std::span<const Run> runs) {
     std::vector<float> no_scratch;
-    const TileSurface surface(grid_, quantisation_, codes, no_scratch);
+    const TileSurface surface(grid_m_, metres_, quantisation_, codes, no_scratch);
     for (const Run& run : runs) {
       for (std::size_t i = run.first; i < run.end; ++i) {
         elevations[i] = surface.elevation(snapped(barycentric(grid_.shape(), grid_.locate(points[i]).point)));

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "isohf/lattice/barycentric.h"
+#include "isohf/restore/ground_scale.h"
 #include "isohf/restore/predict/fixed_point.h"
 #include "isohf/restore/sample_grids.h"
 #include "isohf/surface.h"
@@ -35,8 +36,9 @@ void for_each_tile(const ReadTile& read_tile, TileIndex first, std::int64_t tile
 class PointSampler {
  public:
   /// Keeps at most `memory_bytes` of decoded tiles, and has as much again in hand during a call; one tile in each
-  /// thread at least.
-  PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile, std::uint64_t memory_bytes);
+  /// thread at least. Normals are those of heights and lengths in metres, by `scale`.
+  PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile, std::uint64_t memory_bytes,
+               const GroundScale& scale = {});
 
   void sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples);
   void sample(std::span<const WorldPoint> points, std::span<double> elevations);
@@ -60,6 +62,8 @@ class PointSampler {
   void keep(std::int64_t tile, const Codes& codes);
 
   TileGrid grid_;
+  TileGrid grid_m_;  ///< whose lengths are metres
+  double metres_;    ///< in one elevation unit
   Quantisation quantisation_;
   ReadTile read_tile_;
   std::size_t capacity_;  ///< tiles to keep

@@ -28,16 +28,17 @@ void require(bool holds, const char* what) {
 
 PointShadow::PointShadow(const ArchiveReader& archive, const Sun& sun, double above)
     : archive_(archive),
+      scale_(ground_scale(archive.metadata())),
+      grid_m_(scaled(archive.grid(), scale_)),
       towards_sun_{std::sin(sun.azimuth_deg * kRadians), -std::cos(sun.azimuth_deg * kRadians)},
       sun_(swept_sun(sun.azimuth_deg, sun.elevation_deg, sun_radius_deg(archive.metadata().source.body), 1.0,
-                     sun.elevation_units_per_world_unit)),
-      units_(sun.elevation_units_per_world_unit),
+                     1.0 / scale_.elevation)),
+      units_(1.0 / scale_.elevation),
       elevation_deg_(sun.elevation_deg),
       above_(above),
       highest_(-std::numeric_limits<double>::infinity()) {
   require(std::isfinite(sun.azimuth_deg), "the sun's azimuth must be a number of degrees");
   require(sun.elevation_deg > 0.0 && sun.elevation_deg < 90.0, "the sun must stand above 0 and below 90 degrees");
-  require(sun.elevation_units_per_world_unit > 0.0, "the elevation units in one world unit must be above 0");
   sun_.softness = sun.softness;
   radius_deg_ = elevation_deg_ - std::atan(sun_.lower_fall / units_) / kRadians;
   require(sun_.softness.value_or(1.0) > 0.0, "the sun's apparent size must be above 0");
@@ -56,9 +57,9 @@ double PointShadow::elevation_from_index(std::uint32_t code) const {
 /// them.
 void PointShadow::look_over(const ObjectLine& line, double begin, double end, const TileCodes& codes,
                             Horizon& seen) const {
-  const TileShape& shape = archive_.grid().shape();
+  const TileShape& shape = grid_m_.shape();
   const Quantisation& quantisation = archive_.metadata().quantisation;
-  const double nearest = kNearest * archive_.grid().sigma_x();
+  const double nearest = kNearest * grid_m_.sigma_x();
   auto sides = side_crossings(line, begin);
   for (double t = begin;; t = std::clamp(pass_first(sides), t, end)) {
     const double elevation = elevation_at(shape, codes, quantisation, snapped(barycentric(shape, line.at(t))));
@@ -75,9 +76,10 @@ bool PointShadow::can_hide(double highest, double distance, const Horizon& seen)
   return !sun_.softness && highest - distance * std::max(seen.rise, sun_.lower_fall) > seen.y;
 }
 
-void PointShadow::look(WorldPoint at, PointSampler& tiles, Horizon& seen) const {
-  const TileGrid& grid = archive_.grid();
-  const WorldBounds& ground = archive_.metadata().valid;
+void PointShadow::look(WorldPoint place, PointSampler& tiles, Horizon& seen) const {
+  const TileGrid& grid = grid_m_;
+  const WorldBounds ground = scaled(archive_.metadata().valid, scale_);
+  const WorldPoint at{place.x * scale_.x, place.z * scale_.z};
   double begin = 0.0;
   double end = std::numeric_limits<double>::infinity();
   cut_line(at.x, towards_sun_.x, std::max(ground.x0, 0.0), std::min(ground.x1, grid.world_width()), begin, end);

@@ -27,18 +27,20 @@ class PointShadow {
   struct Horizon {
     double y;       ///< where the sun is looked for
     double shadow;  ///< S
-    double rise;    ///< steepest from y to the ground, elevation units in one world unit
+    double rise;    ///< steepest from y to the ground, elevation units in one metre
   };
-  void look(WorldPoint at, PointSampler& tiles, Horizon& seen) const;
+  void look(WorldPoint place, PointSampler& tiles, Horizon& seen) const;
   [[nodiscard]] bool can_hide(double highest, double distance, const Horizon& seen) const;
   [[nodiscard]] double share(const Horizon& seen) const;
   [[nodiscard]] double elevation_from_index(std::uint32_t code) const;
   void look_over(const ObjectLine& line, double begin, double end, const TileCodes& codes, Horizon& seen) const;
 
   const ArchiveReader& archive_;
+  GroundScale scale_;
+  TileGrid grid_m_;         ///< whose lengths are metres
   WorldPoint towards_sun_;  ///< of length 1
   SweptSun sun_;            ///< falls in elevation units
-  double units_;            ///< of elevation in one world unit
+  double units_;            ///< of elevation in one metre
   double elevation_deg_;
   double radius_deg_;
   double above_;

@@ -166,7 +166,7 @@ struct Surface::State {
       : archive(its_archive),
         job(its_job),
         sampler(archive.grid(), archive.metadata().quantisation, tiles_of(archive),
-                job.memory_bytes > 0 ? job.memory_bytes : kDefaultMemory),
+                job.memory_bytes > 0 ? job.memory_bytes : kDefaultMemory, ground_scale(archive.metadata())),
         georeference(archive.metadata()) {
     if (job.threads != 0) arena.emplace(job);
   }

@@ -215,29 +215,6 @@ TEST(GeoTiffPlace, MalformedKeysAreRefusedOrGiveAPlace) {
   EXPECT_GT(refused, 100);
 }
 
-TEST(LinearUnit, IsKnownByCodeAndByName) {
-  EXPECT_EQ(linear_unit(9001)->name, "metre");
-  EXPECT_EQ(linear_unit("Meters")->metres, 1.0);
-  EXPECT_EQ(linear_unit("FT")->metres, 0.3048);
-  EXPECT_EQ(linear_unit("ftUS")->name, "US survey foot");
-  EXPECT_FALSE(linear_unit(1));
-  EXPECT_FALSE(linear_unit(""));
-  EXPECT_FALSE(linear_unit("parsec"));
-}
-
-TEST(Units, ElevationsAreToldInWorldUnitsWhereBothAreKnown) {
-  Metadata metadata(TileGrid::make(TileShape::make(12, 11, 3), 1, 1, 1.0, 1.0));
-  metadata.horizontal_unit = "metre";
-  metadata.vertical_unit = "ft";
-  EXPECT_EQ(world_per_elevation(metadata), 0.3048);
-  metadata.horizontal_unit = "unknown";
-  EXPECT_EQ(world_per_elevation(metadata), 1.0);
-  metadata.source.crs_unit = "degree";
-  EXPECT_EQ(world_per_elevation(metadata), 0.3048) << "degrees are drawn as metres";
-  metadata.vertical_unit = "unknown";
-  EXPECT_EQ(world_per_elevation(metadata), 1.0);
-}
-
 TEST(BodyOf, PrefersTheNameToTheSize) {
   EXPECT_EQ(body_of("D_Moon_2000", 6378137.0), "Moon");
   EXPECT_EQ(body_of("Lunar polar", std::nullopt), "Moon");

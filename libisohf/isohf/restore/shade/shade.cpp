@@ -299,8 +299,6 @@ void require(const ShadeOptions& options, const GridSize& size) {
   check(options.exaggeration > 0.0 && std::isfinite(options.exaggeration), "the exaggeration must be above 0");
   check(!options.softness || (*options.softness > 0.0 && std::isfinite(*options.softness)),
         "the shadow's softness must be above 0");
-  check(options.elevation_units_per_world_unit > 0.0 && std::isfinite(options.elevation_units_per_world_unit),
-        "the elevation units in one world unit must be above 0");
 }
 
 class ShadeRenderer {
@@ -326,7 +324,7 @@ class ShadeRenderer {
         sun_(towards_sun(request.sun_azimuth_deg, request.sun_elevation_deg)),
         datum_(archive.metadata().statistics.min.value_or(0.0)),
         ground_(ground_scale(archive.metadata())),
-        world_per_elevation_(request.exaggeration / request.elevation_units_per_world_unit) {
+        world_per_elevation_(request.exaggeration * ground_.elevation) {
     if (request.texture) textures_.emplace(archive, x_.step(), z_.step());
     if (casts_shadows(request)) begin_sweep();
     divide_memory();
