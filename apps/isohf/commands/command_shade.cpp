@@ -36,8 +36,9 @@ constexpr double kHighest_deg = 89.9;
 constexpr const char* kShadeFooter =
     R"(The picture covers what the input covered, North at the top; where there is no elevation it is transparent.
 North is the map's, as with GDAL. Shadows fall for a sun that stands anywhere; the ground beyond what the input covered casts
-none. --hillshade is that of gdaldem, by Horn's formula: one band. Hillshades and shadow masks hold 1 to 255, and 0 where
-there is no elevation.
+none. Hillshades and shadow masks have one band: 1 to 255, and 0 where there is no elevation.
+--hillshade is Horn's formula on the surface's elevations in the middle of the pixels: what gdaldem hillshade -compute_edges
+makes of `isohf export --like OUTPUT --method barycentric`.
 .tif has the georeference, .png a world file beside it. .exr holds light, or shares from 0 to 1.
 --date asks for the sun over the archive's middle, on Earth or Mars, at --time: mean solar time there, which is noon where the
 sun stands highest, but for a quarter of an hour.
@@ -72,7 +73,8 @@ struct Kind {
   ShadeKind kind;
 };
 constexpr Kind kKinds[] = {
-    {"--hillshade", "Grey, by how slopes face the sun: one band, as gdaldem hillshade", ShadeKind::kHillshade},
+    {"--hillshade", "Grey, by how slopes face the sun: Horn's formula on the elevations in the middle of pixels",
+     ShadeKind::kHillshade},
     {"--shadow-mask", "The share of the sun that is seen", ShadeKind::kShadowMask},
 };
 

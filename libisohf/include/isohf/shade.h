@@ -20,8 +20,10 @@ namespace isohf {
 
 /// What is drawn. All but the first have one channel.
 enum class ShadeKind {
-  kPicture,     ///< colours, sun, sky and cast shadows
-  kHillshade,   ///< 1...255, as `gdaldem hillshade`; 0 where there is no elevation
+  kPicture,  ///< colours, sun, sky and cast shadows
+  /// Horn's formula on the elevations that the surface has in the middle of the picture's pixels (RestoreMethod
+  /// kBarycentric), as `gdaldem hillshade -compute_edges`: 1...255, 0 where there is no elevation.
+  kHillshade,
   kShadowMask,  ///< share of the sun that is seen, 1...255; 0 where there is no elevation
 };
 
@@ -112,8 +114,8 @@ struct ShadeSamples {
 /// Whole rows of the picture, from North to South, in shade_samples().
 using TakeShadedRows = std::function<void(std::span<const std::byte> rows)>;
 
-/// Renders a picture and hands over whole rows. The pixels do not depend on the number of threads. A pixel's height and
-/// its share of the sun are means of up to 4 x 4 points; slopes are Horn's, of the pixels around. Where a coarse plane
+/// Renders a picture and hands over whole rows. The pixels do not depend on the number of threads. But for hillshades, a
+/// pixel's height and its share of the sun are means of up to 4 x 4 points; slopes are Horn's, of the pixels around. Where a coarse plane
 /// has two vertices or more in a pixel, either way, the coarsest such one is drawn and nothing finer read, unless
 /// textures are. Memory: a row of tiles twice, and 64 MB of the picture's rows, or three rows. A sun in the South reads
 /// the tiles once more, and keeps 64 MB of shadows; or what job.memory_bytes allows. Ground beyond the source casts none.

@@ -27,6 +27,7 @@
 #include "isohf/photo/srgb.h"
 #include "isohf/restore/ground_scale.h"
 #include "isohf/restore/point_sampler.h"
+#include "isohf/restore/shade/hillshade.h"
 
 namespace isohf {
 namespace {
@@ -321,7 +322,6 @@ class ShadeRenderer {
         columns_(grid_, x_),
         palette_(shade_colours(archive.metadata(), request.palette)),
         illumination_(request.sun_azimuth_deg, request.sun_elevation_deg, has_air(archive.metadata())),
-        sun_(towards_sun(request.sun_azimuth_deg, request.sun_elevation_deg)),
         datum_(archive.metadata().statistics.min.value_or(0.0)),
         ground_(ground_scale(archive.metadata())),
         world_per_elevation_(request.exaggeration * ground_.elevation) {
@@ -760,19 +760,12 @@ class ShadeRenderer {
     };
     const ReliefRows rows{heights_at(row - 1), heights_of(pixels), heights_at(row + 1)};
     const PixelSize pixel{x_.pixel() * ground_.x, z_.pixel() * ground_.z};
-    const std::span<float> one(scratch.data(), count);
-    switch (request_.kind) {
-      case ShadeKind::kPicture:
-        relief_normals(rows, pixel, scratch);
-        return colour_row(pixels, block, scratch, out);
-      case ShadeKind::kHillshade:
-        relief_hillshade(rows, pixel, sun_, one);
-        break;
-      case ShadeKind::kShadowMask:
-        std::copy_n(pixels.shares.begin() + block.first, count, one.begin());
-        break;
+    if (request_.kind == ShadeKind::kPicture) {
+      relief_normals(rows, pixel, scratch);
+      return colour_row(pixels, block, scratch, out);
     }
-    // A slope is known by a pixel's neighbours alone.
+    const std::span<float> one(scratch.data(), count);
+    std::copy_n(pixels.shares.begin() + block.first, count, one.begin());
     for (std::size_t i = 0; i < count; ++i) {
       if (std::isnan(rows.here[i])) one[i] = kVoid;
     }
@@ -824,7 +817,6 @@ class ShadeRenderer {
   PointColumns columns_;
   Palette palette_;
   Illumination illumination_;
-  Normal sun_;
   double datum_;
   GroundScale ground_;
   double world_per_elevation_;
@@ -874,6 +866,10 @@ ShadeReport shade_rows(const ArchiveReader& archive, const ShadeOptions& options
   require_callback(take);
   ShadeReport report{options.size.value_or(shade_size(archive))};
   require(options, report.size);
+  if (options.kind == ShadeKind::kHillshade) {
+    hillshade_rows(archive, options, report.size, take, job);
+    return report;
+  }
   Arena(job).execute([&] {
     ShadeRenderer renderer(archive, options, report.size, job);
     report.plane = renderer.plane();
