@@ -16,8 +16,8 @@ test::MemorySource<float> noise(std::int64_t width, std::int64_t height) {
           [&](auto, auto) { return 100.0 * (static_cast<double>(random() >> 11U) * 0x1p-53); }};
 }
 
-ElevationRange widened_by(HeightSource& source, const ReadStep& step) {
-  EdgeRange edge(source.info(), 3, 2);
+ElevationRange widened_by(HeightSource& source, const ReadStep& step, std::int64_t depth_columns) {
+  EdgeRange edge(source.info(), depth_columns, 2);
   std::vector<std::byte> raw;
   for (std::int64_t row = 0; row < source.info().height; row += step.rows) {
     for (const Window& window : step.windows(source.info(), row)) {
@@ -33,17 +33,19 @@ ElevationRange widened_by(HeightSource& source, const ReadStep& step) {
 
 TEST(EdgeRange, DoesNotDependOnHowTheSourceIsCutIntoWindows) {
   auto source = noise(400, 60);
-  const ElevationRange whole = widened_by(source, {60, 400});
-  // From 0 to 100, corners reach 5 a - 4 b.
-  EXPECT_LT(whole.min, -100.0);
-  EXPECT_GE(whole.min, -401.0);
-  EXPECT_GT(whole.max, 200.0);
-  EXPECT_LE(whole.max, 501.0);
-  for (const ReadStep& step :
-       {ReadStep{1, 400}, ReadStep{7, 400}, ReadStep{60, 64}, ReadStep{16, 80}, ReadStep{3, 199}}) {
-    const ElevationRange found = widened_by(source, step);
-    EXPECT_EQ(found.min, whole.min) << step.rows << " " << step.columns;
-    EXPECT_EQ(found.max, whole.max) << step.rows << " " << step.columns;
+  for (const std::int64_t depth : {3, 62, 258, 1000}) {
+    const ElevationRange whole = widened_by(source, {60, 400}, depth);
+    // From 0 to 100, corners reach 5 a - 4 b.
+    EXPECT_LT(whole.min, -100.0);
+    EXPECT_GE(whole.min, -401.0);
+    EXPECT_GT(whole.max, 200.0);
+    EXPECT_LE(whole.max, 501.0);
+    for (const ReadStep& step : {ReadStep{1, 400}, ReadStep{7, 400}, ReadStep{60, 64}, ReadStep{16, 80},
+                                 ReadStep{3, 199}, ReadStep{60, 1}, ReadStep{11, 16}}) {
+      const ElevationRange found = widened_by(source, step, depth);
+      EXPECT_EQ(found.min, whole.min) << depth << ": " << step.rows << " " << step.columns;
+      EXPECT_EQ(found.max, whole.max) << depth << ": " << step.rows << " " << step.columns;
+    }
   }
 }
 

@@ -69,8 +69,6 @@ TEST(ReadStep, WindowsAreWholeBlocksAndCoverARasterOnce) {
       for (std::int64_t row = 0; row < 90; row += step.rows) {
         for (const Window& window : step.windows(source.info(), row)) {
           EXPECT_EQ(window.row, row);
-          // Both sides are wide enough for what counts there.
-          EXPECT_TRUE(window.columns >= 64 || window.columns == 500) << window.columns;
           raw.resize(static_cast<std::size_t>(window.columns * window.rows) * 2);
           source.read_window(window, raw);
         }

@@ -11,6 +11,7 @@ namespace isohf {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr ElevationRange kNothing{kInfinity, -kInfinity};
 
 /// Codes are for the source, not for what lies beyond: an eighth of its range is given at either end.
 constexpr double kMostWidening = 0.125;
@@ -27,10 +28,12 @@ EdgeRange::EdgeRange(const SourceInfo& info, std::int64_t depth_columns, std::in
     : info_(info),
       depth_columns_(static_cast<std::size_t>(std::min(depth_columns + 2, info.width))),
       depth_rows_(static_cast<std::size_t>(std::min(depth_rows + 2, info.height))),
-      bound_{kInfinity, -kInfinity} {}
+      sides_{Side{0, static_cast<std::int64_t>(depth_columns_), 0},
+             Side{info.width - static_cast<std::int64_t>(depth_columns_), info.width, info.width - 1}},
+      bound_(kNothing) {}
 
 EdgeRange::Profile EdgeRange::profile_of(std::span<const float> from_edge) {
-  Profile profile{{kInfinity, -kInfinity}, {kInfinity, -kInfinity}};
+  Profile profile{kNothing, kNothing};
   include(profile.edge, from_edge.front());
   for (const float height : from_edge) include(profile.inside, height);
   return profile;
@@ -46,14 +49,26 @@ void EdgeRange::add_between(const Profile& a, const Profile& b, ElevationRange& 
   bound.min = std::min(bound.min, 2.0 * edge_min - inside_max);
 }
 
-void EdgeRange::add_side(std::span<const std::byte> samples, bool east) {
-  side_.resize(depth_columns_);
-  heights_from_samples(info_, 0.0, samples, side_);
-  if (east) std::reverse(side_.begin(), side_.end());
-  const Profile profile = profile_of(side_);
-  std::optional<Profile>& before = last_profile_[east ? 1 : 0];
-  add_between(profile, before.value_or(profile), bound_);
-  before = profile;
+void EdgeRange::add_side(const Window& window, std::span<const std::byte> raw, Side& side) {
+  const std::int64_t first = std::max(window.column, side.first);
+  const std::int64_t end = std::min(window.column + window.columns, side.end);
+  if (first >= end) return;
+  if (first == side.first) side.rows.assign(static_cast<std::size_t>(window.rows), {kNothing, kNothing});
+  const std::size_t bytes = size_bytes(info_.sample_type);
+  heights_.resize(static_cast<std::size_t>(end - first));
+  for (std::int64_t i = 0; i < window.rows; ++i) {
+    const auto at = static_cast<std::size_t>(i * window.columns + first - window.column);
+    heights_from_samples(info_, 0.0, raw.subspan(at * bytes, heights_.size() * bytes), heights_);
+    Profile& profile = side.rows[static_cast<std::size_t>(i)];
+    for (const float height : heights_) include(profile.inside, height);
+    if (side.edge >= first && side.edge < end)
+      include(profile.edge, heights_[static_cast<std::size_t>(side.edge - first)]);
+  }
+  if (end < side.end) return;
+  for (const Profile& profile : side.rows) {
+    add_between(profile, side.before.value_or(profile), bound_);
+    side.before = profile;
+  }
 }
 
 void EdgeRange::add_window(const Window& window, std::span<const std::byte> raw) {
@@ -61,11 +76,10 @@ void EdgeRange::add_window(const Window& window, std::span<const std::byte> raw)
   const auto columns = static_cast<std::size_t>(window.columns);
   const auto width = static_cast<std::size_t>(info_.width);
   ISOHF_ASSERT(raw.size() == static_cast<std::size_t>(window.rows) * columns * bytes);
+  // Only the ends of most rows are converted.
+  for (Side& side : sides_) add_side(window, raw, side);
   for (std::int64_t i = 0; i < window.rows; ++i) {
     const auto row = raw.subspan(static_cast<std::size_t>(i) * columns * bytes, columns * bytes);
-    // Only the ends of most rows are converted.
-    if (window.column == 0) add_side(row.first(depth_columns_ * bytes), false);
-    if (window.column + window.columns == info_.width) add_side(row.last(depth_columns_ * bytes), true);
     const auto from_north = static_cast<std::size_t>(window.row + i);
     const auto from_south = static_cast<std::size_t>(info_.height - 1 - window.row - i);
     const auto keep = [&](std::vector<float>& rows, std::size_t from_edge) {
@@ -92,7 +106,7 @@ void EdgeRange::add_edge_rows(const std::vector<float>& rows, ElevationRange& bo
   }
   // Corners are continued along both axes: 2(2a - b) - (2c - d) of four values in the corner's block.
   for (const bool east : {false, true}) {
-    ElevationRange block{kInfinity, -kInfinity};
+    ElevationRange block = kNothing;
     for (std::size_t r = 0; r < depth_rows_; ++r) {
       for (std::size_t i = 0; i < depth_columns_; ++i) include(block, rows[r * width + (east ? width - 1 - i : i)]);
     }

@@ -22,8 +22,8 @@ class EdgeRange {
  public:
   EdgeRange(const SourceInfo& info, std::int64_t depth_columns, std::int64_t depth_rows);
 
-  /// raw [window.rows * window.columns samples]. Windows that touch the West or the East edge come from North to South
-  /// and hold all columns that count there: ReadStep's do. The others come in any order.
+  /// raw [window.rows * window.columns samples]. Windows come as ReadStep's do: from North to South, and those of the
+  /// same rows from West to East.
   void add_window(const Window& window, std::span<const std::byte> raw);
 
   /// After all windows: what every continued elevation lies in; empty, min above max, where nothing is known.
@@ -38,18 +38,26 @@ class EdgeRange {
     ElevationRange edge;
     ElevationRange inside;
   };
+  /// The columns that count at the West or the East edge, over as many windows as they take.
+  struct Side {
+    std::int64_t first;                            ///< column
+    std::int64_t end;                              ///< behind the last
+    std::int64_t edge;                             ///< the outermost
+    std::vector<Profile> rows = {};                ///< of the windows' rows, from the columns that came so far
+    std::optional<Profile> before = std::nullopt;  ///< of the row before these
+  };
   static Profile profile_of(std::span<const float> from_edge);
   static void add_between(const Profile& a, const Profile& b, ElevationRange& bound);
-  void add_side(std::span<const std::byte> samples, bool east);
+  void add_side(const Window& window, std::span<const std::byte> raw, Side& side);
   void add_edge_rows(const std::vector<float>& rows, ElevationRange& bound) const;
 
   const SourceInfo& info_;
   std::size_t depth_columns_;
   std::size_t depth_rows_;
-  std::vector<float> north_;                            ///< [depth_rows][width], from the edge
-  std::vector<float> south_;                            ///< the same, from the South edge
-  std::vector<float> side_;                             ///< scratch, from the edge
-  std::array<std::optional<Profile>, 2> last_profile_;  ///< West and East, of the row before
+  std::vector<float> north_;    ///< [depth_rows][width], from the edge
+  std::vector<float> south_;    ///< the same, from the South edge
+  std::vector<float> heights_;  ///< scratch
+  std::array<Side, 2> sides_;   ///< West and East
   ElevationRange bound_;
 };
 

@@ -9,9 +9,6 @@
 namespace isohf {
 namespace {
 
-/// A read is at least this wide, so that one window holds all columns near an edge.
-constexpr std::int64_t kLeastColumns = 64;
-
 std::size_t row_bytes_of(const SourceInfo& info) {
   return static_cast<std::size_t>(info.width) * size_bytes(info.sample_type);
 }
@@ -26,8 +23,7 @@ ReadStep ReadStep::make(const SourceInfo& info, std::uint64_t bytes) {
   const bool is_tiled = info.block_width > 0 && info.block_width < info.width;
   if (row * block_rows <= wanted) return {std::min(info.height, wanted / (row * block_rows) * block_rows), info.width};
   if (!is_tiled) return {std::clamp<std::int64_t>(wanted / row, 1, block_rows), info.width};
-  const std::int64_t least = (kLeastColumns + info.block_width - 1) / info.block_width;
-  const std::int64_t blocks = std::max(least, wanted / (sample * block_rows * info.block_width));
+  const std::int64_t blocks = std::max<std::int64_t>(1, wanted / (sample * block_rows * info.block_width));
   return {block_rows, std::min(info.width, blocks * info.block_width)};
 }
 
