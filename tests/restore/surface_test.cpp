@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstring>
+#include <optional>
 #include <vector>
 
 #include "isohf/archive.h"
@@ -120,6 +121,26 @@ TEST_F(SurfaceInDegrees, BitsDoNotDependOnThreadsOrOnHowRowsAreCut) {
     const std::vector<double> cut = read(archive, grid, rows, 4);
     EXPECT_EQ(std::memcmp(cut.data(), whole.data(), whole.size() * sizeof(double)), 0) << rows;
   }
+}
+
+TEST_F(SurfaceInDegrees, NoRowsAreReadFromMemoryAndFromAScratchFile) {
+  convert_to(ProjectionKind::kEquirectangular);
+  const ArchiveReader archive(folder / "a.isohf");
+  const SampleGrid grid{4000, 40, 0.0, 0.0, 50.0, 50.0};
+  RowReader(archive, grid).read(0, 0, {});
+  // The least memory that it works in leaves rows to the file.
+  Job job;
+  job.threads = 1;
+  job.scratch_folder = folder.path();
+  std::optional<RowReader> rows;
+  for (job.memory_bytes = 1U << 18U; !rows; job.memory_bytes += 1U << 16U) {
+    try {
+      rows.emplace(archive, grid, RestoreMethod::kBarycentric, job);
+    } catch (const Error& error) {
+      ASSERT_EQ(error.code(), ErrorCode::kOutOfMemory);
+    }
+  }
+  rows->read(3, 0, {});
 }
 
 TEST_F(SurfaceInDegrees, RefusesGridsWithoutSamplesAndArchivesWithoutAnOrigin) {

@@ -379,6 +379,7 @@ void RowReader::read(std::int64_t first, std::int64_t rows, std::span<double> el
   }
   require_as_many(elevations.size(), static_cast<std::size_t>(rows * grid.width));
   state_->next_row = first + rows;
+  if (rows == 0) return;
   or_out_of_memory(grid_name(grid), [&] {
     if (state_->places) {
       state_->average(first, rows, elevations);
