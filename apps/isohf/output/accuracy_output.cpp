@@ -31,9 +31,13 @@ ordered_json members_of(const VertexReport& report) {
 }
 
 std::string text_from(const AccuracyReport& report, const std::string& input) {
-  std::string text = line("against", fmt::format("{}: {} of {} samples compared, {} void in the input", input,
-                                                 describe_count(report.samples_compared),
-                                                 describe_count(report.samples), describe_count(report.samples_void)));
+  std::string text = line(
+      "against", fmt::format("{}: {} of {} samples compared, {} void in the input{}", input,
+                             describe_count(report.samples_compared), describe_count(report.samples),
+                             describe_count(report.samples_void),
+                             report.samples_off_map > 0
+                                 ? fmt::format(", {} not on the archive's map", describe_count(report.samples_off_map))
+                                 : ""));
   if (report.samples_lost + report.samples_invented > 0) {
     text += line("voids", fmt::format("{} samples lie in voids of the surface, {} voids lie on it; {} and {} of them "
                                       "away from borders of voids",
@@ -50,6 +54,7 @@ ordered_json members_of(const AccuracyReport& report) {
   return {{"samples", report.samples},
           {"samples_void", report.samples_void},
           {"samples_compared", report.samples_compared},
+          {"samples_off_map", report.samples_off_map},
           {"samples_lost", report.samples_lost},
           {"lost_inside", report.lost_inside},
           {"samples_invented", report.samples_invented},

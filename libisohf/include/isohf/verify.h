@@ -61,6 +61,7 @@ struct AccuracyReport {
   std::int64_t samples = 0;           ///< source samples
   std::int64_t samples_void = 0;      ///< of these, void in the source
   std::int64_t samples_compared = 0;  ///< elevations on both sides
+  std::int64_t samples_off_map = 0;   ///< at places that the archive's map does not show
   std::int64_t samples_lost = 0;      ///< elevations in the source where the archive has none
   std::int64_t lost_inside = 0;       ///< of these, with no void and no edge of the source within reach of a triangle
   std::int64_t samples_invented = 0;  ///< elevations in the archive at void source samples

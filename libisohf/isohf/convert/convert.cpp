@@ -170,7 +170,8 @@ Sums Windows::errors_in(HeldWindow& window, const Plan& plan, const Reconstructi
   const double north = std::floor(bounds.z0 / row_pair);
   const double cells = std::ceil(bounds.x1 / column_step) + 1.0 - west;
   const double pairs = std::ceil(bounds.z1 / row_pair) - north;
-  if (!(cells <= 4096.0 && pairs <= 4096.0)) return {};  // next to a pole
+  // Next to a pole they are too many; fewer than one where the map does not show the window.
+  if (!(cells >= 1.0 && cells <= 4096.0 && pairs <= 4096.0)) return {};
   const TileShape shape = TileShape::make(static_cast<int>(cells) + 4, 2 * std::max(static_cast<int>(pairs), 1) + 3, 1);
   const TileGrid tile =
       TileGrid::make(shape, 1, 1, column_step * shape.cell_columns(), grid.sigma_z() * shape.cell_rows());
@@ -212,6 +213,7 @@ Sums Windows::errors_in(HeldWindow& window, const Plan& plan, const Reconstructi
     for (std::int64_t c = compared.column; c < compared.column + compared.columns; ++c) {
       const auto at = static_cast<std::size_t>((r - held.row) * held.columns + c - held.column);
       const WorldPoint place = world(static_cast<double>(c), static_cast<double>(r));
+      if (!std::isfinite(place.x) || !std::isfinite(place.z)) continue;  // not on the map
       const ObjectPoint object{(place.x - west * column_step) / grid.sigma_x(),
                                (place.z - north * row_pair) / grid.sigma_z()};
       const double error = std::abs(interpolate(barycentric(shape, object), view) - double{window.heights[at]});

@@ -84,12 +84,14 @@ void place_by_warp(const SourceInfo& info, const ProjectionRequest& asked, const
                    std::shared_ptr<const ReferenceMap> source_map, SourceFrame& frame) {
   const Georeference& place = info.georeference;
   const ProjectionSpec& spec = frame.projection->spec;
-  if (!std::isfinite(bounds.west)) {
+  const auto require_shown = [&](double coordinate) {
+    if (std::isfinite(coordinate)) return;
     refuse_source(
         fmt::format("{}: `projection` {} has no place for a part of the input, or its edge runs through it; convert "
                     "what lies within (`bbox`){}",
                     info.path, asked.name(), asked.is_auto ? "" : ", or give `projection` auto"));
-  }
+  };
+  require_shown(bounds.west);
   const double grain = grain_of(std::min(frame.spacing_x, frame.spacing_z));
   const MapPoint origin{std::floor(bounds.west / grain) * grain, std::ceil(bounds.north / grain) * grain};
   frame.size_x = std::ceil((bounds.east - origin.easting) / grain) * grain;
@@ -104,6 +106,7 @@ void place_by_warp(const SourceInfo& info, const ProjectionRequest& asked, const
                          info.height,
                          std::move(source_map)};
   const WorldPoint first = ExactWarp(*frame.warp).world_from_source({0.0, 0.0});
+  require_shown(first.x);  // the metadata state it
   frame.first_sample_x = first.x;
   frame.first_sample_z = first.z;
 }

@@ -13,7 +13,6 @@
 #include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/archive/metadata/cut_record.h"
 #include "isohf/base/arena.h"
-#include "isohf/base/assert.h"
 #include "isohf/base/memory/memory_budget.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
@@ -44,6 +43,11 @@ constexpr std::int64_t kMostReach = 64;
 constexpr std::size_t kMostPeaks = 256;
 /// Object coordinates this near to a vertex's are the vertex's: places are rounded, and next to a void it matters.
 constexpr double kOnVertex = 1e-7;
+
+/// Whether a map shows the place of a sample.
+bool is_shown(WorldPoint world) {
+  return std::isfinite(world.x) && std::isfinite(world.z);
+}
 
 double snapped(double object) {
   const double whole = std::round(object);
@@ -189,8 +193,8 @@ class Comparison {
       }
       job.report({"compare", "rows", tile_row + 1, grid_.tile_rows()});
     }
-    // Every sample lies on one tile row.
-    ISOHF_ASSERT(is_cut_ || visited_ == info_.width * info_.height);
+    // Each of the others was visited on one tile row.
+    if (!is_cut_) report.samples_off_map = info_.width * info_.height - visited_;
   }
 
   /// One past the last source row that lies North of the tile row's South edge; all that are left, for the last row.
@@ -314,7 +318,7 @@ class Comparison {
         Sums& of_row = sums[static_cast<std::size_t>(row - first)];
         for (std::int64_t c = column; c < end_column; ++c) {
           const WorldPoint world = warp_->world_from_source({static_cast<double>(c), static_cast<double>(row)});
-          if (tile_row_at(world) != surface.tile_row) continue;
+          if (!is_shown(world) || tile_row_at(world) != surface.tile_row) continue;
           ++of_row.visited;
           if (is_elsewhere(world)) continue;
           compare_sample(elevation_at(surface, world), band, c, row, world, of_row, histogram);
@@ -333,7 +337,9 @@ class Comparison {
       for (const double s : {0.0, 0.5, 1.0}) {
         const double u = static_cast<double>(column) + s * static_cast<double>(end_column - 1 - column);
         const double v = static_cast<double>(row) + t * static_cast<double>(end_row - 1 - row);
-        const double z = warp_->world_from_source({u, v}).z;
+        const WorldPoint world = warp_->world_from_source({u, v});
+        if (!is_shown(world)) return true;  // on the map's outline
+        const double z = world.z;
         least = std::min(least, z);
         most = std::max(most, z);
       }
