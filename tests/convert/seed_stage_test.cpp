@@ -129,6 +129,18 @@ TEST(SeedStage, FeetAndMetresAreKeptApart) {
   EXPECT_NEAR(ShadowSeedReader(archive).info().elevation_units_per_world_unit, 1.0 / 0.3048, 1e-12);
 }
 
+TEST(SeedStage, AWorldOfDegreesHasNoSeeds) {
+  const test::TemporaryFolder folder;
+  Ridges source;
+  source.mutable_info().georeference.unit = HorizontalUnit::kDegree;
+  ConvertOptions options = options_with({2.0});
+  options.plan.ground.projection.is_auto = false;
+  options.plan.ground.projection.kind = ProjectionKind::kNone;
+  EXPECT_THROW((void)convert(source, folder / "a.isohf", options), Error);
+  options.shadow_seeds.reset();
+  EXPECT_NO_THROW((void)convert(source, folder / "a.isohf", options));
+}
+
 TEST(SeedStage, ArchivesWithSeedsVerifyAndUnzip) {
   const test::TemporaryFolder folder;
   Ridges source;

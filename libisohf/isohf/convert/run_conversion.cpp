@@ -315,7 +315,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
                                 const ConvertOptions& options, const Job& job, bool is_retry, const ShardWork* shard) {
   const auto start = std::chrono::steady_clock::now();
   const SourceInfo& info = source.info();
-  if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, plan.grid);
+  if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, info, plan);
   std::optional<TextureStage> textures;
   if (options.texture) {
     textures.emplace(TextureStage::make(plan, info, *options.texture, threads_of(job), textured_tiles_in_flight(job)));

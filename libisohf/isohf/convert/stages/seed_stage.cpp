@@ -17,13 +17,19 @@ ShadowSeedInfo info_of(const ShadowSeedRequest& request, double elevation_units_
 
 }  // namespace
 
-void check_seed_request(const ShadowSeedRequest& request, const TileGrid& grid) {
+void check_seed_request(const ShadowSeedRequest& request, const SourceInfo& info, const Plan& plan) {
   if (!(request.sun_min_deg >= kMinSunDeg && request.sun_min_deg < 90.0)) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("`sun_min_deg` is {} degrees, must be a sun elevation from {} to below 90",
                             request.sun_min_deg, kMinSunDeg));
   }
-  if (!has_room_for_seeds(grid)) {
+  if (info.georeference.unit == HorizontalUnit::kDegree && !plan.frame.in_metres) {
+    throw Error(ErrorCode::kUnsupported,
+                fmt::format("{}: `shadow_seeds` needs a world in metres, and `projection` none lays this one out in "
+                            "degrees; leave one of them out",
+                            info.path));
+  }
+  if (!has_room_for_seeds(plan.grid)) {
     throw Error(
         ErrorCode::kUnsupported,
         "`shadow_seeds`: rows of 2^31 lattice vertices and more have no room for seeds; use a larger `spacing`");

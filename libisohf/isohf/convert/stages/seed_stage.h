@@ -4,12 +4,13 @@
 
 #include "isohf/archive/writer.h"
 #include "isohf/convert.h"
+#include "isohf/convert/frame/plan.h"
 #include "isohf/convert/stages/seed_row.h"
 
 namespace isohf {
 
 /// Throws Error{kInvalidArgument, kUnsupported} naming the option where the request cannot be met.
-void check_seed_request(const ShadowSeedRequest& request, const TileGrid& grid);
+void check_seed_request(const ShadowSeedRequest& request, const SourceInfo& info, const Plan& plan);
 
 /// Shadow seeds in the pass that makes the tiles. What a tile's neighbours cast over its edges is known when its row of
 /// tiles is complete, for westward light from the East; so one row is kept, as hulls, and the members of a row follow
