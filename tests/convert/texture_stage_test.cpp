@@ -135,6 +135,31 @@ TEST(PhotoPlacement, RefusesAnotherReferenceSystemAndAnotherPlace) {
   EXPECT_THAT(message_of(place), HasSubstr("shows no ground of memory"));
 }
 
+TEST(PhotoPlacement, TakesTheRoundedFeetOfAnotherWriterAndAsksWhoUnderstandsTexts) {
+  Hills source(100, 80);
+  Georeference& ours = source.mutable_info().georeference = utm(500015.0, 3999985.0, 30.0);
+  ours.metres_per_unit = 1200.0 / 3937.0;
+  ours.system.epsg.reset();
+  ours.system.wkt = "PROJCS[\"one\"]";
+  MemoryPhoto photo(400, 300, 3, noise);
+  photo.mutable_info().georeference = ours;
+  Georeference& theirs = *photo.mutable_info().georeference;
+  const auto place = [&](std::optional<bool> same_system) {
+    (void)place_photo(photo.info(), source.info(), make_source_frame(source.info()), same_system);
+  };
+  for (const double foot : {0.3048006096012, 0.304800609601}) {
+    theirs.metres_per_unit = foot;
+    EXPECT_NO_THROW(place({})) << foot;
+  }
+  theirs.system.wkt = "PROJCS[\"another\"]";
+  EXPECT_NO_THROW(place(true));
+  EXPECT_THROW(place({}), Error);
+  EXPECT_THROW(place(false), Error);
+  theirs = ours;
+  theirs.metres_per_unit = 0.3048;
+  EXPECT_THROW(place(true), Error) << "of two feet, whatever is said of the systems";
+}
+
 TEST(TextureStage, StoresWhatTheCutterCutsForEveryTileWithGround) {
   const test::TemporaryFolder folder;
   Hills source;

@@ -227,7 +227,7 @@ Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files)
     prepared.files.push_back(file);
     options.convert.source_note.fingerprint += fmt::format(" | {} {}", file, FileStamp::of(file).text());
   }
-  prepared.photo = open_texture(options.texture, options.convert.texture);
+  prepared.photo = open_texture(options.texture, prepared.source->info(), options.convert.texture);
   check_spacing_unit(prepared.source->info(), options.convert.plan, options.spacing_in_metres);
   return prepared;
 }

@@ -4,6 +4,7 @@
 
 #include <bit>
 
+#include "formats/georeference/reference_system.h"
 #include "isohf/error.h"
 #include "isohf/photo/texture_cutter.h"
 #include "isohf/picture.h"
@@ -37,12 +38,16 @@ void check_texture_options(const TextureOptions& options) {
   }
 }
 
-std::unique_ptr<PhotoSource> open_texture(const TextureOptions& options, std::optional<TextureRequest>& request) {
+std::unique_ptr<PhotoSource> open_texture(const TextureOptions& options, const SourceInfo& source,
+                                          std::optional<TextureRequest>& request) {
   if (options.photo.empty()) return nullptr;
   std::unique_ptr<PhotoSource> photo = open_photo(options.photo);
   request.emplace();
   request->max_size = options.max_size.value_or(request->max_size);
   request->photo = photo.get();
+  if (const auto& place = photo->info().georeference; place && source.georeference.has_origin) {
+    request->same_system = are_same(place->system, source.georeference.system);
+  }
   return photo;
 }
 

@@ -20,8 +20,8 @@ void add_texture_options(CommandLine& line, TextureOptions& options);
 /// Throws Error{kInvalidArgument} for a size without a photo.
 void check_texture_options(const TextureOptions& options);
 
-/// Opens the photo and fills `request`, which points to it; nullptr where none was asked for.
-[[nodiscard]] std::unique_ptr<PhotoSource> open_texture(const TextureOptions& options,
+/// Opens the photo of a source and fills `request`, which points to it; nullptr where none was asked for.
+[[nodiscard]] std::unique_ptr<PhotoSource> open_texture(const TextureOptions& options, const SourceInfo& source,
                                                         std::optional<TextureRequest>& request);
 
 /// "1024 x 1024 texels a tile, 8 levels, jpeg 90: 1040 members, 12.3 MB; 0.87 photo pixels a texel". 0 pixels: left

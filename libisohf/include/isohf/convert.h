@@ -67,6 +67,8 @@ struct TextureRequest {
   PhotoSource* photo = nullptr;         ///< must outlive the conversion
   std::optional<TextureFormat> format;  ///< nullopt: JPEG; PNG where the photo has alpha or is a part
   int max_size = 1024;                  ///< texels on a side at most: a power of two, 64...4096
+  /// Whether the photo's reference system is the source's, if the caller understands both; nullopt: as their texts say.
+  std::optional<bool> same_system = std::nullopt;
 };
 
 /// What an archive says of its source beyond what the source itself says.

@@ -23,12 +23,13 @@ std::string name_of(const Georeference& place) {
   return "an unnamed system";
 }
 
-/// False where both sides state something and it is not the same.
-bool may_be_the_same(const Georeference& a, const Georeference& b) {
+/// False where both sides state something and it is not the same. Writers round the length of a foot.
+bool may_be_the_same(const Georeference& a, const Georeference& b, std::optional<bool> same_system) {
   if (a.unit != HorizontalUnit::kUnknown && b.unit != HorizontalUnit::kUnknown &&
-      (a.unit != b.unit || a.metres_per_unit != b.metres_per_unit)) {
+      (a.unit != b.unit || std::abs(a.metres_per_unit - b.metres_per_unit) > 1e-9 * a.metres_per_unit)) {
     return false;
   }
+  if (same_system) return *same_system;
   if (a.system.epsg && b.system.epsg) return *a.system.epsg == *b.system.epsg;
   if (!a.system.wkt.empty() && !b.system.wkt.empty()) return a.system.wkt == b.system.wkt;
   if (!a.system.name.empty() && !b.system.name.empty()) return a.system.name == b.system.name;
@@ -36,10 +37,10 @@ bool may_be_the_same(const Georeference& a, const Georeference& b) {
 }
 
 void place_by_georeference(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame,
-                           PhotoPlacement& placement) {
+                           std::optional<bool> same_system, PhotoPlacement& placement) {
   const Georeference& here = *photo.georeference;
   const Georeference& there = source.georeference;
-  if (!may_be_the_same(here, there)) {
+  if (!may_be_the_same(here, there, same_system)) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: is in {}, {} in {}; bring the photo into the same reference system first (gdalwarp)",
                             photo.path, name_of(here), source.path, name_of(there)));
@@ -72,10 +73,11 @@ void place_over_source(const PhotoInfo& photo, const SourceInfo& source, const S
                   photo.path, photo.width, photo.height, source.width, source.height, stretch));
 }
 
-PhotoPlacement place_on_rows(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame) {
+PhotoPlacement place_on_rows(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame,
+                             std::optional<bool> same_system) {
   PhotoPlacement placement;
   if (photo.georeference && source.georeference.has_origin) {
-    place_by_georeference(photo, source, frame, placement);
+    place_by_georeference(photo, source, frame, same_system, placement);
   } else {
     place_over_source(photo, source, frame, placement);
   }
@@ -127,9 +129,10 @@ PhotoInfo on_the_same_turn(const PhotoInfo& photo, const SourceInfo& source) {
   return turned;
 }
 
-PhotoPlacement place_by_projection(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame) {
+PhotoPlacement place_by_projection(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame,
+                                   std::optional<bool> same_system) {
   const SourceFrame own_units = own_units_of(source, frame);
-  PhotoPlacement placement = place_on_rows(on_the_same_turn(photo, source), source, own_units);
+  PhotoPlacement placement = place_on_rows(on_the_same_turn(photo, source), source, own_units, same_system);
   const PhotoFrame in_own_units = placement.frame;
   const Georeference& there = source.georeference;
   const double west = there.origin_x - own_units.first_sample_x;
@@ -168,8 +171,10 @@ PhotoPlacement place_by_projection(const PhotoInfo& photo, const SourceInfo& sou
 
 }  // namespace
 
-PhotoPlacement place_photo(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame) {
-  return frame.warp ? place_by_projection(photo, source, frame) : place_on_rows(photo, source, frame);
+PhotoPlacement place_photo(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame,
+                           std::optional<bool> same_system) {
+  return frame.warp ? place_by_projection(photo, source, frame, same_system)
+                    : place_on_rows(photo, source, frame, same_system);
 }
 
 }  // namespace isohf

@@ -23,8 +23,9 @@ struct PhotoPlacement {
 /// Both georeferenced: as they say. Else the photo covers exactly what the source covers: its pixel edges lie on the
 /// outer edges of area pixels, or on the first and last posts; but where a source on posts has as many samples as the
 /// photo has pixels, their middles lie on the posts. A side without a named reference system is taken to be in the
-/// other's. Throws Error{kInvalidArgument} where the reference systems differ or the photo shows no ground of the
-/// source.
-[[nodiscard]] PhotoPlacement place_photo(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame);
+/// other's. same_system as TextureRequest has it. Throws Error{kInvalidArgument} where the reference systems differ or the
+/// photo shows no ground of the source.
+[[nodiscard]] PhotoPlacement place_photo(const PhotoInfo& photo, const SourceInfo& source, const SourceFrame& frame,
+                                         std::optional<bool> same_system = std::nullopt);
 
 }  // namespace isohf

@@ -157,13 +157,13 @@ TextureStage::TextureStage(std::unique_ptr<PhotoSource> bordered, PhotoSource& p
 TextureStage TextureStage::make(const Plan& plan, const SourceInfo& source, const TextureRequest& request, int threads,
                                 int tiles_at_once) {
   check(request, request.photo->info());
-  PhotoPlacement placement = place_photo(request.photo->info(), source, plan.frame);
+  PhotoPlacement placement = place_photo(request.photo->info(), source, plan.frame, request.same_system);
   TextureInfo info = describe(plan, request, placement);
   // Beyond a photo of a part of the ground nothing is shown, which takes alpha: where JPEG is asked for, its border goes on.
   std::unique_ptr<PhotoSource> bordered;
   if (placement.is_part && request.format != TextureFormat::kJpeg) {
     bordered = std::make_unique<BorderedPhoto>(*request.photo);
-    placement = place_photo(bordered->info(), source, plan.frame);
+    placement = place_photo(bordered->info(), source, plan.frame, request.same_system);
     info.format = TextureFormat::kPng;
     info.channels = 4;
   }
