@@ -48,16 +48,19 @@ TEST(JobFingerprint, TellsTreatmentsOfVoidsApart) {
   }
 }
 
-TEST(JobFingerprint, TellsEffortsSeedsAndTexturesApart) {
+TEST(JobFingerprint, TellsEffortsSeedsTexturesAndTapsApart) {
   const SourceInfo info = source_info();
   MemoryPhoto photo(3, 2, 3, [](auto, auto, int) { return 0; });
-  std::vector<ConvertOptions> all(7);
+  std::vector<ConvertOptions> all(9);
   all[1].effort = Effort::kFast;
   all[2].effort = Effort::kBest;
   all[3].shadow_seeds = ShadowSeedRequest{2.0};
   all[4].shadow_seeds = ShadowSeedRequest{3.0};
   all[5].texture = TextureRequest{&photo, {}, 64};
   all[6].texture = TextureRequest{&photo, {}, 128};
+  for (const std::size_t i : {7U, 8U}) all[i].acquisition.kind = Acquisition::Kind::kTaps;
+  all[7].acquisition.taps = {0.1, 0.8, 0.1};
+  all[8].acquisition.taps = {0.1, 0.8000000000000002, 0.1};
   std::set<std::string> found;
   for (const ConvertOptions& options : all) {
     EXPECT_TRUE(found.insert(job_fingerprint(info, make_plan(info, options.plan), options)).second) << found.size();

@@ -110,11 +110,11 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
       // The archive itself knows its source by the name that it states.
       of_files || options.source_note.name.empty() ? std::filesystem::path(info.path).filename().string()
                                                    : options.source_note.name,
-      status.st_size, known ? status.st_mtim.tv_sec : 0, known ? status.st_mtim.tv_nsec : 0, info.width, info.height,
-      to_string(info.sample_type), info.channel, info.z_scale, info.z_offset, describe_voids(info), shape.columns(),
-      shape.rows(), shape.levels(), plan.grid.tile_columns(), plan.grid.tile_rows(), plan.grid.extent_x(),
-      plan.grid.extent_z(), plan.frame.first_sample_x, plan.frame.first_sample_z, plan.frame.spacing_x,
-      plan.frame.spacing_z, to_string(plan.outside), to_string(options.code_type),
+      known ? status.st_size : 0, known ? status.st_mtim.tv_sec : 0, known ? status.st_mtim.tv_nsec : 0, info.width,
+      info.height, to_string(info.sample_type), info.channel, info.z_scale, info.z_offset, describe_voids(info),
+      shape.columns(), shape.rows(), shape.levels(), plan.grid.tile_columns(), plan.grid.tile_rows(),
+      plan.grid.extent_x(), plan.grid.extent_z(), plan.frame.first_sample_x, plan.frame.first_sample_z,
+      plan.frame.spacing_x, plan.frame.spacing_z, to_string(plan.outside), to_string(options.code_type),
       options.z_range ? fmt::format("{}:{}", options.z_range->first, options.z_range->second) : "data",
       options.step           ? fmt::format("{}", *options.step)
       : options.max_rounding ? fmt::format("rounding {}", *options.max_rounding)
