@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -102,60 +101,37 @@ TEST_F(ShadeCommand, ExaggerationLengthensShadows) {
   EXPECT_GT(green.at(kWall + 70, 60), green.at(kWall + 20, 60));
 }
 
-/// Ranks of values, ties sharing the mean of theirs, and how two rankings go together: 1 where they are the same.
-double spearman(const std::vector<std::byte>& a, const std::vector<std::byte>& b) {
-  const auto ranks = [](const std::vector<std::byte>& values) {
-    std::array<double, 256> counts{};
-    for (const std::byte value : values) counts[static_cast<std::size_t>(value)] += 1.0;
-    std::array<double, 256> rank{};
-    double below = 0.0;
-    for (std::size_t i = 0; i < counts.size(); ++i) {
-      rank[i] = below + counts[i] / 2.0;
-      below += counts[i];
-    }
-    return rank;
-  };
-  const auto rank_a = ranks(a);
-  const auto rank_b = ranks(b);
-  const double middle = static_cast<double>(a.size()) / 2.0;
-  double ab = 0.0;
-  double aa = 0.0;
-  double bb = 0.0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const double x = rank_a[static_cast<std::size_t>(a[i])] - middle;
-    const double y = rank_b[static_cast<std::size_t>(b[i])] - middle;
-    ab += x * y;
-    aa += x * x;
-    bb += y * y;
-  }
-  return ab / std::sqrt(aa * bb);
-}
-
-TEST_F(ShadeCommand, HillshadesRankPixelsAsGdalDoes) {
+TEST_F(ShadeCommand, HillshadesAreThoseOfGdalOfTheElevationsInTheMiddleOfPixels) {
   if (!has_gdal()) GTEST_SKIP() << "gdaldem is not installed (Debian: gdal-bin)";
   const std::string input = ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif";
   ASSERT_EQ(run_isohf({"convert", input, folder / "r.isohf", "-q"}).exit_code, 0);
-  const Channel source = read_channel(input, "0");
-  const std::string size = fmt::format("{}x{}", source.width, source.height);
-  for (const std::vector<std::string>& light :
-       std::vector<std::vector<std::string>>{{}, {"-az", "200", "-alt", "30"}, {"-z", "0.5"}}) {
-    ASSERT_EQ(
-        run_gdal(with_more({"gdaldem", "hillshade", input, folder / "g.tif", "-q", "-compute_edges"}, light)).exit_code,
-        0);
-    std::vector<std::string> ours = {"shade", folder / "r.isohf", folder / "h.tif", "--overwrite", "-q", "--size",
-                                     size,    "--hillshade"};
-    for (const std::string& word : light) {
-      const std::map<std::string, std::string> names = {
-          {"-az", "--azimuth"}, {"-alt", "--sun-elevation"}, {"-z", "--exaggeration"}};
-      ours.push_back(names.contains(word) ? names.at(word) : word);
+  const std::map<std::string, std::string> gdal_names = {
+      {"--azimuth", "-az"}, {"--sun-elevation", "-alt"}, {"--exaggeration", "-z"}};
+  for (const std::vector<std::string>& light : std::vector<std::vector<std::string>>{
+           {}, {"--azimuth", "200", "--sun-elevation", "30"}, {"--exaggeration", "0.5"}}) {
+    for (const std::string size : {"512x384", "300x100"}) {
+      SCOPED_TRACE(fmt::format("{} {}", size, fmt::join(light, " ")));
+      const auto run = [&](const std::vector<std::string>& arguments) {
+        const RunResult made = run_isohf(arguments);
+        EXPECT_EQ(made.exit_code, 0) << made.err;
+      };
+      run(with_more({"shade", folder / "r.isohf", folder / "h.tif", "--overwrite", "-q", "--size", size, "--hillshade"},
+                    light));
+      run({"export", folder / "r.isohf", folder / "e.tif", "--overwrite", "-q", "--like", folder / "h.tif", "--method",
+           "barycentric", "--type", "f32"});
+      std::vector<std::string> gdal = {"gdaldem",        "hillshade", folder / "e.tif",
+                                       folder / "g.tif", "-q",        "-compute_edges"};
+      for (const std::string& word : light) gdal.push_back(gdal_names.contains(word) ? gdal_names.at(word) : word);
+      ASSERT_EQ(run_gdal(gdal).exit_code, 0);
+      const Channel a = read_channel(folder / "g.tif", "");
+      const Channel b = read_channel(folder / "h.tif", "");
+      ASSERT_EQ(a.bytes.size(), b.bytes.size());
+      int others = 0;
+      for (std::size_t i = 0; i < a.bytes.size(); ++i) {
+        if (std::abs(static_cast<int>(a.bytes[i]) - static_cast<int>(b.bytes[i])) > 1) ++others;
+      }
+      EXPECT_LE(others, 4) << "corners alone, where gdaldem continues one axis";
     }
-    const RunResult made = run_isohf(ours);
-    ASSERT_EQ(made.exit_code, 0) << made.err;
-    const Channel a = read_channel(folder / "g.tif", "");
-    const Channel b = read_channel(folder / "h.tif", "");
-    ASSERT_EQ(a.bytes.size(), b.bytes.size());
-    EXPECT_GE(spearman(a.bytes, b.bytes), 0.99) << fmt::format("{}", fmt::join(light, " "));
-    EXPECT_NEAR(a.place.origin_x, b.place.origin_x, 1e-6);
   }
 }
 
