@@ -11,7 +11,7 @@
 
 namespace isohf {
 
-/// The samples of a grid in world units that lie in a part of the world; nullopt where none does.
+/// The samples of a grid in world units, continued on all sides, that lie in a part of the world; nullopt if none does.
 [[nodiscard]] std::optional<SampleGrid> part_of(const SampleGrid& grid, const WorldBounds& ground);
 
 /// Once round the body, where columns of an archive's world are longitudes.
