@@ -66,7 +66,7 @@ Measured measure(const ConvertSummary& summary) {
 }
 
 ordered_json document_of(const ConvertCommandOptions& options, const ConvertSummary& summary,
-                         const std::optional<VoidCounts>& voids, const std::optional<ErrorEstimate>& expected) {
+                         const std::optional<VoidCounts>& voids, const ErrorEstimate& expected) {
   const std::optional<AccuracyInfo> accuracy = accuracy_info(summary.metadata);
   const Measured measured = measure(summary);
   const SizeBesideSource size(summary.metadata, summary.tile_bytes);
@@ -102,7 +102,7 @@ ordered_json document_of(const ConvertCommandOptions& options, const ConvertSumm
 }
 
 std::string text_from(const ConvertCommandOptions& options, const ConvertSummary& summary,
-                      const std::optional<VoidCounts>& voids, const std::optional<ErrorEstimate>& expected) {
+                      const std::optional<VoidCounts>& voids, const ErrorEstimate& expected) {
   const Measured measured = measure(summary);
   const Metadata& metadata = summary.metadata;
   const TileShape& shape = metadata.grid.shape();
@@ -285,7 +285,7 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
   std::string note = note_of_interrupted_run(options);
   ConvertSummary summary = convert(*prepared.source, file.output, options.convert, job);
   const ordered_json document =
-      document_of(options, summary, counts_of_voids(*prepared.source, summary.source_voids), std::nullopt);
+      document_of(options, summary, counts_of_voids(*prepared.source, summary.source_voids), {});
   return EachResult{true, json_line(document), std::move(summary.warnings), std::move(note)};
 }
 
@@ -320,11 +320,7 @@ int run(ConvertCommandOptions options) {
     out.finish();
     return kExitDone;
   }
-  std::optional<ErrorEstimate> expected;
-  if (!common.quiet && (common.verbose || !options.convert.max_error))
-    expected = estimate_error(source, options.convert, job);
-  if (common.verbose && !common.quiet) print_plan_notes(source, options.convert, job, expected);
-  if (options.convert.max_error) expected.reset();  // it is measured
+  if (common.verbose && !common.quiet) print_plan_notes(source, options.convert, job);
   if (const std::string note = note_of_interrupted_run(options); !note.empty() && !common.quiet) print_note(note);
   const ConvertSummary summary = [&] {
     try {
@@ -334,6 +330,9 @@ int run(ConvertCommandOptions options) {
       throw interrupted(options.output, "the same command with --resume");
     }
   }();
+  ErrorEstimate expected;
+  if (!common.quiet && !options.convert.max_error)
+    expected = estimate_error(source, options.convert, job, summary.metadata.quantisation);
   display.reset();
   print_warnings(summary.warnings);
   const std::optional<VoidCounts> voids = counts_of_voids(source, summary.source_voids);

@@ -81,16 +81,20 @@ std::string describe_accuracy(const AccuracyInfo& info, const std::string& unit)
                      info.max_error ? fmt::format("; {}{} was allowed", *info.max_error, unit) : "");
 }
 
-ordered_json json_from_estimate(const std::optional<ErrorEstimate>& estimate) {
-  if (!estimate) return nullptr;
-  return {{"rms", estimate->rms}, {"largest_seen", estimate->largest}, {"samples", estimate->samples}};
+ordered_json json_from_estimate(const ErrorEstimate& estimate) {
+  if (estimate.samples == 0) return nullptr;
+  return {{"rms", estimate.rms},
+          {"largest_seen", estimate.largest},
+          {"samples", estimate.samples},
+          {"lost", estimate.lost}};
 }
 
-std::string describe_estimate(const std::optional<ErrorEstimate>& estimate, const std::string& unit) {
-  if (!estimate)
-    return "error not estimated: memory is limited, or the input cannot be read here and there in little time";
-  return fmt::format("error of about {:.3g}{} (rms); the largest of {} samples looked at is {:.3g}{}: an estimate",
-                     estimate->rms, unit, describe_count(estimate->samples), estimate->largest, unit);
+std::string describe_estimate(const ErrorEstimate& estimate, const std::string& unit) {
+  if (estimate.samples == 0) return "error not estimated: " + estimate.why_none;
+  return fmt::format(
+      "error of about {:.3g}{} (rms); the largest of {} samples looked at is {:.3g}{}: an estimate{}", estimate.rms,
+      unit, describe_count(estimate.samples), estimate.largest, unit,
+      estimate.lost > 0 ? fmt::format("; {} more beside voids have no surface", describe_count(estimate.lost)) : "");
 }
 
 ordered_json json_from(const Accuracy& accuracy) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
-#include <optional>
 #include <string>
 
 #include "isohf/convert.h"
@@ -20,9 +19,9 @@ struct Accuracy {
 
 /// "rms 4.7, largest 61 over 1,442,401 samples".
 [[nodiscard]] std::string describe_accuracy(const AccuracyInfo& info, const std::string& unit);
-[[nodiscard]] nlohmann::ordered_json json_from_estimate(const std::optional<ErrorEstimate>& estimate);
-/// Says that it is an estimate.
-[[nodiscard]] std::string describe_estimate(const std::optional<ErrorEstimate>& estimate, const std::string& unit);
+[[nodiscard]] nlohmann::ordered_json json_from_estimate(const ErrorEstimate& estimate);
+/// Says that it is an estimate, or why there is none.
+[[nodiscard]] std::string describe_estimate(const ErrorEstimate& estimate, const std::string& unit);
 
 /// Members as docs/cli.md has them.
 [[nodiscard]] nlohmann::ordered_json json_from(const Accuracy& accuracy);

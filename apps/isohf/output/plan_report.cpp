@@ -19,7 +19,7 @@ namespace {
 using nlohmann::ordered_json;
 
 ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory,
-                            std::uint64_t bound_bytes, CodeType code_type, const std::optional<ErrorEstimate>& error,
+                            std::uint64_t bound_bytes, CodeType code_type, const ErrorEstimate& error,
                             const std::vector<std::string>& warnings) {
   const std::uint64_t raw =
       static_cast<std::uint64_t>(plan.lattice_samples) * static_cast<std::uint64_t>(raw_bytes(code_type));
@@ -58,7 +58,7 @@ ordered_json json_from_plan(const SourceInfo& info, const Plan& plan, const Memo
 }
 
 std::string text_from_plan(const SourceInfo& info, const Plan& plan, const MemoryPlan& memory,
-                           const ConvertOptions& options, const std::optional<ErrorEstimate>& error) {
+                           const ConvertOptions& options, const ErrorEstimate& error) {
   const CodeType code_type = options.code_type;
   const GroundRequest& ground = options.plan.ground;
   const TileGrid& grid = plan.grid;
@@ -122,7 +122,12 @@ void print_plan(HeightSource& source, const ConvertOptions& options, const Job& 
     all.emplace_back(fmt::format("convert would refuse: {}", refusal.what()));
   }
   print_warnings(all);
-  const std::optional<ErrorEstimate> error = is_refused ? std::nullopt : estimate_error(source, options, job);
+  ErrorEstimate error;
+  if (is_refused) {
+    error.why_none = "the conversion would be refused";
+  } else {
+    error = estimate_error(source, options, job);
+  }
   StandardOutput out;
   if (common.json) {
     out.write(json_text(json_from_plan(info, plan, memory, job.bound_bytes(), options.code_type, error, warnings)));
@@ -132,11 +137,10 @@ void print_plan(HeightSource& source, const ConvertOptions& options, const Job& 
   out.finish();
 }
 
-void print_plan_notes(HeightSource& source, const ConvertOptions& options, const Job& job,
-                      const std::optional<ErrorEstimate>& error) {
+void print_plan_notes(HeightSource& source, const ConvertOptions& options, const Job& job) {
   const Plan plan = make_plan(source.info(), options.plan);
-  std::istringstream lines(
-      text_from_plan(source.info(), plan, plan_memory(source, plan, options, job), options, error));
+  std::istringstream lines(text_from_plan(source.info(), plan, plan_memory(source, plan, options, job), options,
+                                          estimate_error(source, options, job)));
   for (std::string line; std::getline(lines, line);) print_note(line);
 }
 

@@ -10,7 +10,6 @@ namespace isohf::cli {
 void print_plan(HeightSource& source, const ConvertOptions& options, const Job& job, const CommonOptions& common);
 
 /// The same text on standard error, for -v.
-void print_plan_notes(HeightSource& source, const ConvertOptions& options, const Job& job,
-                      const std::optional<ErrorEstimate>& error);
+void print_plan_notes(HeightSource& source, const ConvertOptions& options, const Job& job);
 
 }  // namespace isohf::cli

@@ -148,13 +148,16 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
 struct ErrorEstimate {
   double rms = 0.0;
   double largest = 0.0;      ///< of those looked at: most often there are larger ones
-  std::int64_t samples = 0;  ///< that it stands on
+  std::int64_t samples = 0;  ///< that it stands on; 0: there is no estimate
+  std::int64_t lost = 0;     ///< elevations looked at that have no surface: void vertices beside them
+  std::string why_none;      ///< a clause, where there is none
 };
 
-/// The error that such a conversion will have, from up to 64 windows of 64 x 64 samples, at most a thirtieth of a large
-/// source: resampled and compared on the triangles as the archive will be. Deterministic. nullopt where the source
-/// would have to be unpacked as a whole or filled for it, where memory is limited, or where nothing but voids was met.
-[[nodiscard]] std::optional<ErrorEstimate> estimate_error(HeightSource& source, const ConvertOptions& options,
-                                                          const Job& job = {});
+/// The error that such a conversion will have, by all samples of a source of up to a million, and by about a tenth of a
+/// larger one, 64 windows of 64 x 64 at most: resampled, rounded and compared on the triangles as the archive will be.
+/// Deterministic. `codes` are those of the archive, where it is made; without them the range of what is looked at tells
+/// them. There is no estimate where a large source would have to be unpacked or filled as a whole for it.
+[[nodiscard]] ErrorEstimate estimate_error(HeightSource& source, const ConvertOptions& options, const Job& job = {},
+                                           std::optional<Quantisation> codes = std::nullopt);
 
 }  // namespace isohf

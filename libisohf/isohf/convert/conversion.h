@@ -6,6 +6,7 @@
 #include "isohf/archive/tile/quantise.h"
 #include "isohf/convert.h"
 #include "isohf/convert/memory_plan.h"
+#include "isohf/convert/stages/choose_quantisation.h"
 #include "isohf/sampling/resample/kernels.h"
 #include "isohf/sampling/resample/prefilter.h"
 #include "isohf/sampling/resample/tile_resampler.h"
@@ -38,6 +39,10 @@ struct Conversion {
     return make_tile_resampler(plan.grid, geometry(), kernel, held_within);
   }
 };
+
+/// How the options ask for codes, of heights that are off by height_error.
+[[nodiscard]] QuantisationRequest quantisation_request(const SourceInfo& info, const ConvertOptions& options,
+                                                       double height_error);
 
 /// The first pass over the source, where one is needed, and what follows from it: datum, scale and offset.
 void choose_codes(Conversion& conversion, ConvertSummary& summary);

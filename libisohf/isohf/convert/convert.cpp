@@ -1,19 +1,24 @@
 #include "isohf/convert.h"
 
 #include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <numeric>
 
+#include "isohf/archive/tile/quantise.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/sample.h"
 #include "isohf/convert/conversion.h"
 #include "isohf/convert/run_conversion.h"
+#include "isohf/convert/stages/choose_quantisation.h"
 #include "isohf/error.h"
 #include "isohf/lattice/barycentric.h"
+#include "isohf/sampling/resample/height_error.h"
 #include "isohf/sampling/source/source_statistics.h"
 
 namespace isohf {
@@ -21,9 +26,13 @@ namespace {
 
 constexpr std::int64_t kSide = 64;  ///< of a window, in samples
 constexpr std::int64_t kMostWindows = 64;
-/// Of a source's samples that are looked at; a source of so many is looked at anyhow.
+/// Of a source's samples that windows hold, to choose a density and to estimate an error.
 constexpr double kShare = 0.03;
+constexpr double kShareOfEstimate = 0.1;
+/// A source of up to that many samples is estimated by all of them.
 constexpr std::int64_t kSmall = std::int64_t{1} << 20U;
+/// A source that is unpacked from its first sample on, or filled, is not estimated beyond that many.
+constexpr std::int64_t kMostUnpacked = std::int64_t{1} << 25U;
 
 /// Densities that are tried: each more than the one before by this.
 constexpr double kLeastDensity = 1.0 / 64.0;
@@ -38,6 +47,11 @@ struct Sums {
   std::int64_t count = 0;
   double squares = 0.0;
   double largest = 0.0;
+  std::int64_t lost = 0;  ///< elevations without a surface
+
+  [[nodiscard]] Sums operator+(const Sums& other) const {
+    return {count + other.count, squares + other.squares, std::max(largest, other.largest), lost + other.lost};
+  }
 };
 
 /// A part of the source as heights, and those of its samples that a surface is compared with.
@@ -60,15 +74,22 @@ struct Reconstruction {
   }
 };
 
+/// How vertices are stored: to a step from 0 while the codes are not known, or by these.
+struct Storing {
+  double step = 0.0;  ///< 0: as they are
+  std::optional<Quantisation> codes;
+  double most_off = 0.0;  ///< as Conversion has it
+};
+
 class Windows {
  public:
-  Windows(HeightSource& source, const ConvertOptions& options)
-      : source_(source), info_(source.info()), z_range_(options.z_range) {}
+  /// margin  samples around what a plan's triangles need
+  Windows(HeightSource& source, const ConvertOptions& options, std::int64_t margin = 48)
+      : source_(source), info_(source.info()), z_range_(options.z_range), margin_(margin) {}
 
   /// Reads samples with what a surface by this plan, or a denser one, needs around them.
   void add(const Window& compared, const Plan& plan) {
-    constexpr std::int64_t kTapsAndHalo = 48;
-    const auto margin = [](double steps) { return static_cast<std::int64_t>(std::ceil(steps)) + kTapsAndHalo; };
+    const auto margin = [&](double steps) { return static_cast<std::int64_t>(std::ceil(steps)) + margin_; };
     const std::int64_t margin_x = margin(8.0 * plan.grid.sigma_x() / plan.frame.spacing_x);
     const std::int64_t margin_z = margin(4.0 * plan.grid.sigma_z() / plan.frame.spacing_z);
     HeldWindow window;
@@ -104,17 +125,33 @@ class Windows {
     });
   }
 
-  /// The errors at all samples compared of the window added last, which is let go.
-  [[nodiscard]] Sums take_errors(const Plan& plan, const Reconstruction& by, double step) {
-    HeldWindow window = std::move(windows_.back());
-    windows_.pop_back();
-    return errors_in(window, plan, by, step);
+  /// The errors at all samples compared, on all threads; no window is left.
+  [[nodiscard]] Sums take_errors(const Plan& plan, const Reconstruction& by, const Storing& storing) {
+    std::vector<Sums> parts(windows_.size());
+    oneapi::tbb::parallel_for(std::size_t{0}, parts.size(),
+                              [&](std::size_t i) { parts[i] = errors_in(windows_[i], plan, by, storing); });
+    windows_.clear();
+    return std::accumulate(parts.begin(), parts.end(), Sums{});
+  }
+
+  /// The elevations of all windows, none of which is left; nullopt where all are void.
+  [[nodiscard]] std::optional<ElevationRange> take_range() {
+    ElevationRange range{HUGE_VAL, -HUGE_VAL};
+    for (const HeldWindow& window : windows_) {
+      for (const float height : window.heights) {
+        const double elevation = double{height} + datum_.value_or(0.0);  // NaN compares false
+        range.min = elevation < range.min ? elevation : range.min;
+        range.max = elevation > range.max ? elevation : range.max;
+      }
+    }
+    windows_.clear();
+    return range.min <= range.max ? std::optional(range) : std::nullopt;
   }
 
   /// Whether all are within `most`. What failed last is asked first.
   [[nodiscard]] bool are_within(double most, const Plan& plan, const Reconstruction& by, double step) {
     for (std::size_t i = 0; i < windows_.size(); ++i) {
-      if (errors_in(windows_[i], plan, by, step).largest <= most) continue;
+      if (errors_in(windows_[i], plan, by, {step, {}}).largest <= most) continue;
       std::rotate(windows_.begin(), windows_.begin() + static_cast<std::ptrdiff_t>(i),
                   windows_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
       return false;
@@ -123,11 +160,14 @@ class Windows {
   }
 
  private:
-  [[nodiscard]] Sums errors_in(HeldWindow& window, const Plan& plan, const Reconstruction& by, double step) const;
+  [[nodiscard]] Sums errors_in(HeldWindow& window, const Plan& plan, const Reconstruction& by,
+                               const Storing& storing) const;
+  void store(const Storing& storing, std::span<const float> smooth, std::span<float> heights) const;
 
   HeightSource& source_;
   const SourceInfo& info_;
   std::optional<std::pair<double, double>> z_range_;
+  std::int64_t margin_;
   std::optional<double> datum_;
   std::vector<HeldWindow> windows_;
 };
@@ -145,8 +185,33 @@ SourceBand band_of(HeldWindow& window, const Reconstruction& by) {
           held.column};
 }
 
+/// Leaves what is read of the heights once they are stored.
+void Windows::store(const Storing& storing, std::span<const float> smooth, std::span<float> heights) const {
+  const double datum = datum_.value_or(0.0);
+  if (storing.codes) {
+    const CodeLimits limits = z_range_ ? CodeLimits{z_range_->first, z_range_->second} : code_limits(*storing.codes);
+    TileCodes tile;
+    if (smooth.empty()) {
+      (void)quantise(*storing.codes, limits, datum, heights, tile);
+    } else {
+      (void)quantise_within(*storing.codes, limits, datum, storing.most_off, heights, smooth, tile);
+    }
+    for (std::size_t i = 0; i < heights.size(); ++i) {
+      heights[i] = static_cast<float>(elevation_of_vertex(tile, *storing.codes, i) - datum);
+    }
+    return;
+  }
+  for (float& height : heights) {
+    if (std::isnan(height)) continue;
+    double elevation = double{height} + datum;
+    if (z_range_) elevation = std::clamp(elevation, z_range_->first, z_range_->second);
+    height = static_cast<float>((storing.step > 0.0 ? std::round(elevation / storing.step) * storing.step : elevation) -
+                                datum);
+  }
+}
+
 /// Cuts the piece of the plan's lattice that covers the window, as one tile of a size of its own.
-Sums Windows::errors_in(HeldWindow& window, const Plan& plan, const Reconstruction& by, double step) const {
+Sums Windows::errors_in(HeldWindow& window, const Plan& plan, const Reconstruction& by, const Storing& storing) const {
   const Window& compared = window.compared;
   const TileGrid& grid = plan.grid;
   const SourceFrame& frame = plan.frame;
@@ -200,13 +265,19 @@ Sums Windows::errors_in(HeldWindow& window, const Plan& plan, const Reconstructi
   if (!is_held) return {};  // across the seam of a joined source, or where the map is too far from square
   std::vector<float> heights(static_cast<std::size_t>(shape.stored_vertex_count()));
   cutter->cut({0, 0}, band_of(window, by), heights);
-  const double datum = datum_.value_or(0.0);
-  for (float& height : heights) {
-    if (std::isnan(height)) continue;
-    double elevation = double{height} + datum;
-    if (z_range_) elevation = std::clamp(elevation, z_range_->first, z_range_->second);
-    height = static_cast<float>((step > 0.0 ? std::round(elevation / step) * step : elevation) - datum);
+  std::vector<float> smooth;
+  if (storing.most_off > 0.0) {
+    smooth.resize(heights.size());
+    window.filter.reset();  // the coefficients are others'
+    cutter->cut({0, 0}, band_of(window, {by.kernel, Prefilter::smoothing()}), smooth);
+    window.filter.reset();
   }
+  store(storing, smooth, heights);
+  // There the archive's tiles end, with vertices that this one does not have.
+  const auto is_at_border = [&, all = frame.bounds()](WorldPoint at) {
+    return plan.outside == Outside::kVoid && (warp || std::min(at.x - all.x0, all.x1 - at.x) < column_step ||
+                                              std::min(at.z - all.z0, all.z1 - at.z) < row_pair);
+  };
   const View2D<const float> view(heights.data(), shape.columns(), shape.rows());
   Sums sums;
   for (std::int64_t r = compared.row; r < compared.row + compared.rows; ++r) {
@@ -216,8 +287,12 @@ Sums Windows::errors_in(HeldWindow& window, const Plan& plan, const Reconstructi
       if (!std::isfinite(place.x) || !std::isfinite(place.z)) continue;  // not on the map
       const ObjectPoint object{(place.x - west * column_step) / grid.sigma_x(),
                                (place.z - north * row_pair) / grid.sigma_z()};
-      const double error = std::abs(interpolate(barycentric(shape, object), view) - double{window.heights[at]});
-      if (!(error >= 0.0)) continue;  // void
+      const double error =
+          std::abs(interpolate(snapped(barycentric(shape, object)), view) - double{window.heights[at]});
+      if (!(error >= 0.0)) {  // void
+        sums.lost += std::isnan(window.heights[at]) || is_at_border(place) ? 0 : 1;
+        continue;
+      }
       ++sums.count;
       sums.squares += error * error;
       sums.largest = std::max(sums.largest, error);
@@ -227,10 +302,10 @@ Sums Windows::errors_in(HeldWindow& window, const Plan& plan, const Reconstructi
 }
 
 /// Windows all over the source, from North to South.
-std::vector<Window> spread_windows(const SourceInfo& info) {
+std::vector<Window> spread_windows(const SourceInfo& info, double share = kShare) {
   const double samples = static_cast<double>(info.width) * static_cast<double>(info.height);
   const double wanted =
-      std::clamp(kShare * samples / static_cast<double>(kSide * kSide), 4.0, static_cast<double>(kMostWindows));
+      std::clamp(share * samples / static_cast<double>(kSide * kSide), 4.0, static_cast<double>(kMostWindows));
   const auto across = static_cast<std::int64_t>(std::sqrt(wanted));
   std::vector<Window> windows;
   for (std::int64_t i = 0; i < across * across; ++i) {
@@ -374,6 +449,36 @@ ConvertSummary convert_within(HeightSource& source, const std::string& output, c
                                   : ", or leave `density`, `spacing` and `tiles` out"));
 }
 
+/// Windows by which a source's error is estimated: all of a small one. What is unpacked or filled is so by rows: it is
+/// read in whole ones, from North to South, but for sources whose rows are curves of the world.
+std::vector<Window> windows_of_estimate(const SourceInfo& info, bool is_slow, bool is_curved) {
+  constexpr std::int64_t kColumns = 1024;
+  const bool is_small = info.width <= kSmall / info.height;
+  if (!is_small && (!is_slow || is_curved)) return spread_windows(info, kShareOfEstimate);
+  const std::int64_t columns = is_curved ? kSide : kColumns;
+  const std::int64_t rows = is_small ? kSide : kSide / 4;
+  const std::int64_t every = is_small ? rows : rows * static_cast<std::int64_t>(1.0 / kShareOfEstimate);
+  std::vector<Window> windows;
+  for (std::int64_t row = (every - rows) / 2; row < info.height; row += every) {
+    for (std::int64_t column = 0; column < info.width; column += columns) {
+      windows.push_back({column, row, std::min(columns, info.width - column), std::min(rows, info.height - row)});
+    }
+  }
+  return windows;
+}
+
+/// The codes that elevations in this range will have; floats where they would be refused.
+Quantisation expected_codes(const SourceInfo& info, const ConvertOptions& options, const Reconstruction& by,
+                            const ElevationRange& range) {
+  const QuantisationRequest request =
+      quantisation_request(info, options, height_error(by.kernel, by.prefilter, range, choose_datum(range)));
+  try {
+    return options.z_range ? quantisation_of_range(request, range, info) : choose_quantisation(request, range, info);
+  } catch (const Error&) {
+    return {CodeType::kF32};
+  }
+}
+
 }  // namespace
 
 ConvertSummary convert(HeightSource& source, const std::string& output, const ConvertOptions& options, const Job& job) {
@@ -381,29 +486,50 @@ ConvertSummary convert(HeightSource& source, const std::string& output, const Co
   return run_conversion(source, plan_conversion(source.info(), options), output, options, job).summary;
 }
 
-std::optional<ErrorEstimate> estimate_error(HeightSource& source, const ConvertOptions& options, const Job& job) {
+ErrorEstimate estimate_error(HeightSource& source, const ConvertOptions& options, const Job& job,
+                             std::optional<Quantisation> codes) {
   const SourceInfo& info = source.info();
-  // These are unpacked from their first sample on, or look far around each window.
-  const bool is_slow = info.fill_distance > 0 || info.format == "PNG" || info.path.ends_with(".gz");
-  if ((is_slow && info.width * info.height > kSmall) || job.memory_bytes != 0) return std::nullopt;
   const Plan plan = plan_conversion(info, options);
+  const bool is_unpacked = info.format == "PNG" || info.path.ends_with(".gz");
+  const bool is_slow = info.fill_distance > 0 || is_unpacked;
+  ErrorEstimate estimate;
+  if (is_slow && info.width > kMostUnpacked / info.height) {
+    estimate.why_none = fmt::format("the input would have to be {} once more", is_unpacked ? "unpacked" : "filled");
+    return estimate;
+  }
+  const Reconstruction by = Reconstruction::make(options.filter.value_or(kDefaultFilter), options.acquisition);
+  const bool looks_far = !by.prefilter.is_identity() || plan.frame.warp || chooses_codes(options);
+  Windows windows(source, options, looks_far ? 48 : 12);
+  const std::vector<Window> places = windows_of_estimate(info, is_slow, plan.frame.warp.has_value());
   Sums sums;
-  Job alone;
-  alone.threads = 1;  // not worth more
-  Arena(alone).execute([&] {
-    Windows windows(source, options);
-    const Reconstruction by = Reconstruction::make(options.filter.value_or(kDefaultFilter), options.acquisition);
-    const double step = expected_step(info, options);
-    for (const Window& window : spread_windows(info)) {
-      windows.add(window, plan);
-      const Sums part = windows.take_errors(plan, by, step);
-      sums.count += part.count;
-      sums.squares += part.squares;
-      sums.largest = std::max(sums.largest, part.largest);
+  Arena(job).execute([&] {
+    const auto in_turn = [&](auto take) {
+      const std::size_t at_once = job.memory_bytes != 0 ? 1 : 16;
+      for (std::size_t first = 0; first < places.size(); first += at_once) {
+        job.throw_if_cancelled();
+        for (std::size_t i = first; i < std::min(first + at_once, places.size()); ++i) windows.add(places[i], plan);
+        take();
+      }
+    };
+    std::optional<ElevationRange> range;
+    if (options.z_range) range = {options.z_range->first, options.z_range->second};
+    if (!codes && !range) {
+      in_turn([&] {
+        const std::optional<ElevationRange> part = windows.take_range();
+        if (!range) range = part;
+        if (part) range = {std::min(range->min, part->min), std::max(range->max, part->max)};
+      });
     }
+    if (!codes && range) codes = expected_codes(info, options, by, *range);
+    if (!codes) return;  // all is void
+    const Storing storing{0.0, codes, chooses_codes(options) ? *options.max_rounding : 0.0};
+    in_turn([&] { sums = sums + windows.take_errors(plan, by, storing); });
   });
-  if (sums.count == 0) return std::nullopt;
-  return ErrorEstimate{std::sqrt(sums.squares / static_cast<double>(sums.count)), sums.largest, sums.count};
+  if (sums.count == 0) {
+    estimate.why_none = "no elevation was found where it was looked for";
+    return estimate;
+  }
+  return {std::sqrt(sums.squares / static_cast<double>(sums.count)), sums.largest, sums.count, sums.lost, {}};
 }
 
 }  // namespace isohf

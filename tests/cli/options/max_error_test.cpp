@@ -131,15 +131,17 @@ TEST_F(MaxError, InfoPrintsWhatWasMeasuredAndVerifyFindsWhatIsNotTrue) {
   EXPECT_THAT(other.out, HasSubstr("ISOHF-0025 error: the metadata state an error of rms"));
 }
 
-TEST_F(MaxError, PlanAndSummaryExpectTheErrorToAFactorOfTwo) {
+TEST_F(MaxError, PlanAndSummaryExpectTheErrorThatIsFound) {
   for (const std::vector<std::string>& way : std::vector<std::vector<std::string>>{{}, {"--density", "0.3"}}) {
     const json planned =
         json::parse(run_isohf(with_more({"plan", folder / "a.tif", "--nodata=-32768", "--json"}, way)).out)
             .at("expected_error");
-    EXPECT_EQ(json::parse(convert(with_more({"--json"}, way)).out).at("expected_error"), planned);
+    const json expected = json::parse(convert(with_more({"--json"}, way)).out).at("expected_error");
     const json found = against();
-    EXPECT_GT(planned.at("rms").get<double>(), 0.5 * found.at("rms").get<double>());
-    EXPECT_LT(planned.at("rms").get<double>(), 2.0 * found.at("rms").get<double>());
+    const auto rms = found.at("rms").get<double>();
+    // All samples are looked at; plan does not know how far the border's slope goes on, and with it the codes' range.
+    EXPECT_NEAR(expected.at("rms").get<double>(), rms, 1e-3 * rms);
+    EXPECT_NEAR(planned.at("rms").get<double>(), rms, 1e-2 * rms);
     EXPECT_LE(planned.at("largest_seen").get<double>(), 1.0001 * found.at("max").get<double>());
     EXPECT_GT(planned.at("samples").get<int>(), 4000);
   }

@@ -126,13 +126,17 @@ ElevationRange measure_surface(const Conversion& conversion, const ElevationRang
 
 /// Also chooses the datum.
 QuantisationRequest request_of(Conversion& conversion, const ElevationRange& range) {
-  const SourceInfo& info = conversion.source.info();
-  const ConvertOptions& options = conversion.options;
-  QuantisationRequest request{options.code_type, options.step, options.max_rounding};
   conversion.datum = choose_datum(range);
   conversion.largest = std::max(std::abs(range.min), std::abs(range.max));
   conversion.height_error = height_error(conversion.kernel, conversion.prefilter, range, conversion.datum);
-  request.height_error = conversion.height_error;
+  return quantisation_request(conversion.source.info(), conversion.options, conversion.height_error);
+}
+
+}  // namespace
+
+QuantisationRequest quantisation_request(const SourceInfo& info, const ConvertOptions& options, double height_error) {
+  QuantisationRequest request{options.code_type, options.step, options.max_rounding};
+  request.height_error = height_error;
   // Of the error that is allowed an eighth is left to the rounding, which then takes few bytes.
   if (options.max_error) request.wish = *options.max_error / 4.0;
   // Samples that are vertices lose nothing by the step that is usual.
@@ -141,8 +145,6 @@ QuantisationRequest request_of(Conversion& conversion, const ElevationRange& ran
   }
   return request;
 }
-
-}  // namespace
 
 void choose_codes(Conversion& conversion, ConvertSummary& summary) {
   const SourceInfo& info = conversion.source.info();
