@@ -90,7 +90,6 @@ inline double weight_of(Kernel kernel, double distance) {
 /// At a column and row of the raster, fractional, within half a sample of it.
 inline Answer elevation_at(const Ground& ground, Kernel kernel, double u, double v) {
   constexpr double kClose = 1e-9;  // places are computed in another order than the library's
-  const double nan = std::numeric_limits<double>::quiet_NaN();
   const bool inside =
       u >= 0.0 && v >= 0.0 && u <= static_cast<double>(ground.width - 1) && v <= static_cast<double>(ground.height - 1);
   const auto near_whole = [](double at) { return std::abs(at - std::round(at)) < kClose; };
@@ -108,8 +107,7 @@ inline Answer elevation_at(const Ground& ground, Kernel kernel, double u, double
         answer.most = std::fmax(answer.most, found);
       }
     }
-    if (voids == 4) return {true, nan, nan};
-    answer.is_known = voids == 0;
+    answer.is_known = voids == 0;  // beside a void the lattice decides
     return answer;
   }
   const int reach = kernel == Kernel::kBilinear ? 1 : 2;
@@ -136,7 +134,7 @@ inline Answer elevation_at(const Ground& ground, Kernel kernel, double u, double
     }
   }
   if (std::abs(weights - 0.5) < 1e-5) return {false, 0.0, 0.0};
-  if (all_void || weights < 0.5) return {true, nan, nan};
+  if (all_void || weights < 0.5) return {false, 0.0, 0.0};
   double value = sum / weights;
   if (kernel == Kernel::kLimitedCubic) value = std::clamp(value, low, high);
   return {true, value, value};

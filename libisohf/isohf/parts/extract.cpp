@@ -77,7 +77,11 @@ Metadata metadata_of_cut(const Metadata& whole, int plane, const TileRange& tile
     metadata.textures.clear();
     for (const char* name : {kShadowSeedsName, kTileTexturesName}) drop_extension(metadata, name);
   }
-  set_extension(metadata, kCutName, format_cut(tiles.first));
+  CutRecord cut = cut_record(whole).value_or(CutRecord{});
+  cut.column = tiles.first.column;
+  cut.row = tiles.first.row;
+  if (plane > 0) cut.coarser = cut.coarser.value_or(1) * std::llround(from.sigma_z() / whole.grid.sigma_z());
+  set_extension(metadata, kCutName, write_extension(cut, cut_members));
   return metadata;
 }
 

@@ -56,6 +56,7 @@ SourceGeometry archive_geometry(const Metadata& metadata) {
   }
   SourceGeometry geometry = geometry_of(metadata);
   geometry.outside = known(metadata.outside, "outside");
+  if (const auto cut = cut_record(metadata)) geometry.coarser = static_cast<double>(cut->coarser.value_or(1));
   return geometry;
 }
 

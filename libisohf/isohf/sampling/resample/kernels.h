@@ -24,8 +24,10 @@ struct TapWeights {
 ///
 /// How to evaluate in two dimensions, with tap weights w[i] along the columns and v[j] along the rows:
 ///   1. Beyond the raster's true ends a tap reads what stands in there by edges() (continue_row). It is not a void.
-///   2. A point is void where all samples around it (columns floor(u) and ceil(u), rows likewise) are void.
-///   3. Let W = sum of w[i] v[j] over the taps whose sample is not void. A point with W < 1/2 is void.
+///   2. A point has a height by rule 4 unless all samples around it (columns floor(u) and ceil(u), rows likewise) are
+///      void.
+///   3. Let W = sum of w[i] v[j] over the taps whose sample is not void. Rule 4 needs W >= 1/2. Any other vertex of a
+///      lattice has a height by rule 7, or is void.
 ///   4. The value is the sum of w[i] v[j] c[i, j]. Where some of these coefficients are NaN, they are left out and the
 ///      sum is divided by the weight of the others; a Prefilter leaves none NaN where rule 2 holds, so that happens
 ///      only to samples that are their own coefficients. But with four samples around the
@@ -36,6 +38,8 @@ struct TapWeights {
 ///      quarter of it is moved to there.
 ///   6. Where is_limited(), a value beyond the range of the four samples around the point (of those that are no voids)
 ///      is moved to its end.
+///   7. A vertex that is a corner of a triangle with a valid sample lies beside it (LatticeAround): it has the height of a
+///      plane through the valid samples around. So no sample loses its surface to voids nearby.
 /// W is the plain sum, negative lobes included: the weights of the taps that were dropped then sum to at most 1/2, and
 /// the result stays an affine combination of heights, exact on level ground.
 class Kernel {

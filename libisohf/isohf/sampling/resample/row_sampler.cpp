@@ -218,25 +218,29 @@ ColumnTaps make_column_taps(const SourceAxis& axis, const Kernel& kernel, std::s
   return taps;
 }
 
-void add_columns_needed(const SourceAxis& axis, const ColumnTaps& taps, RowRange& range) {
+void add_columns_needed(const SourceAxis& axis, const ColumnTaps& taps, std::int64_t reach, RowRange& range) {
   const std::int64_t last = axis.samples() - 1;
   const auto add = [&](std::int64_t column) {
     range.first = std::min(range.first, column);
     range.last = std::max(range.last, column);
   };
-  add(std::clamp<std::int64_t>(taps.first, 0, last));
-  add(std::clamp<std::int64_t>(taps.first + taps.width - 1, 0, last));
+  add(std::clamp<std::int64_t>(taps.first - reach, 0, last));
+  add(std::clamp<std::int64_t>(taps.first + taps.width - 1 + reach, 0, last));
   for (std::int64_t k = taps.first; k < 0; ++k) add(axis.index(k));
   for (std::int64_t k = last + 1; k < taps.first + taps.width; ++k) add(axis.index(k));
 }
 
 RowSampler::RowSampler(const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel,
-                       const ElevationRange& limits)
+                       const ElevationRange& limits, const LatticeAround& around)
     : axis_x_(axis_x),
       axis_z_(axis_z),
       kernel_(kernel),
+      around_(around),
       lowest_(static_cast<float>(limits.min)),
-      highest_(static_cast<float>(limits.max)) {}
+      highest_(static_cast<float>(limits.max)) {
+  around_.lowest = lowest_;
+  around_.highest = highest_;
+}
 
 void RowSampler::add_rows_needed(double world_z, RowRange& range) const {
   const auto add = [&](double v) {
@@ -246,6 +250,10 @@ void RowSampler::add_rows_needed(double world_z, RowRange& range) const {
       range.first = std::min(range.first, mirrored);
       range.last = std::max(range.last, mirrored);
     }
+    const std::int64_t reach = around_.reach_z > kernel_.taps() / 2 ? around_.reach_z : 0;
+    range.first = std::min(range.first, std::clamp<std::int64_t>(first - reach, 0, axis_z_.samples() - 1));
+    range.last =
+        std::max(range.last, std::clamp<std::int64_t>(first + kernel_.taps() - 1 + reach, 0, axis_z_.samples() - 1));
   };
   const SourceAxis::Place place = axis_z_.place(world_z);
   add(place.position);
@@ -278,7 +286,7 @@ void RowSampler::resample_near_voids(const SourceBand& band, double v, const Col
     scratch.void_line.resize(scratch.line.size());
     find_voids(band, rows, kernel_.taps(), axis_x_, axis_z_, columns, scratch.void_line, scratch.near_void);
   }
-  const VoidRule rule(band, axis_x_, axis_z_, kernel_);
+  const VoidRule rule(band, axis_x_, axis_z_, kernel_, around_);
   for (std::size_t c = 0; c < values.size(); ++c) {
     if (!std::isnan(values[c]) && scratch.near_void[c] == 0) continue;
     TapWeights taps{columns.first + columns.start[c], {}};

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "isohf/sampling/resample/kernels.h"
+#include "isohf/sampling/resample/void_rule.h"
 #include "isohf/sampling/source/source_axis.h"
 #include "isohf/sampling/source/source_band.h"
 #include "isohf/sampling/source/source_statistics.h"
@@ -31,14 +32,15 @@ struct ColumnTaps {
 [[nodiscard]] ColumnTaps make_column_taps(const SourceAxis& axis, const Kernel& kernel,
                                           std::span<const double> world_x);
 
-/// Widens `range` by the source columns that the taps read.
-void add_columns_needed(const SourceAxis& axis, const ColumnTaps& taps, RowRange& range);
+/// Widens `range` by the source columns that the taps read, and `reach` more to either side.
+void add_columns_needed(const SourceAxis& axis, const ColumnTaps& taps, std::int64_t reach, RowRange& range);
 
 /// Resamples the source along rows of vertices. An elevation is a pure function of its place. Thread-safe.
 class RowSampler {
  public:
   /// `limits`, relative to the bands' datum, hold the continuation beyond the source's edge only.
-  RowSampler(const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel, const ElevationRange& limits);
+  RowSampler(const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel, const ElevationRange& limits,
+             const LatticeAround& around = {});
 
   /// Widens `range` by the source rows that a row of vertices reads.
   void add_rows_needed(double world_z, RowRange& range) const;
@@ -55,7 +57,7 @@ class RowSampler {
   };
   /// The row of vertices at world_z. `band` holds at least what add_rows_needed and add_columns_needed ask for.
   /// heights [columns.count - 2] out, relative to the band's datum; NaN where void: outside the source by
-  /// Outside::kVoid, or where less than half of the kernel's weight, or none of the nearest samples, is valid.
+  /// Outside::kVoid, or by the rules of kernels.h.
   void sample(const SourceBand& band, double world_z, const ColumnTaps& columns, Scratch& scratch,
               std::span<float> heights) const;
 
@@ -68,6 +70,7 @@ class RowSampler {
   SourceAxis axis_x_;
   SourceAxis axis_z_;
   Kernel kernel_;
+  LatticeAround around_;
   float lowest_;
   float highest_;
 };

@@ -61,10 +61,21 @@ ColumnTaps taps_of_tile(const TileGrid& grid, const SourceAxis& axis, const Kern
   return make_column_taps(axis, kernel, world_x);
 }
 
+/// coarser  as SourceGeometry has it
+LatticeAround around_of(const TileGrid& grid, const SourceAxis& x, const SourceAxis& z, double coarser) {
+  return {LatticeAround::reach_of(2.0 * grid.sigma_x() / coarser / x.spacing_world()),
+          LatticeAround::reach_of(grid.sigma_z() / coarser / z.spacing_world()),
+          grid.sigma_x() / coarser,
+          grid.sigma_z() / coarser,
+          x.spacing_world(),
+          z.spacing_world(),
+          nullptr};
+}
+
 class GridResampler final : public TileResampler {
  public:
   GridResampler(const TileGrid& grid, const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel,
-                const ElevationRange& limits);
+                const ElevationRange& limits, double coarser);
 
   [[nodiscard]] RowRange rows_needed(std::int64_t tile_row) const override;
   [[nodiscard]] RowRange columns_needed(std::int64_t tile_column) const override;
@@ -75,12 +86,17 @@ class GridResampler final : public TileResampler {
   TileGrid grid_;
   SourceAxis axis_x_;
   Kernel kernel_;
+  LatticeAround around_;
   RowSampler sampler_;
 };
 
 GridResampler::GridResampler(const TileGrid& grid, const SourceAxis& axis_x, const SourceAxis& axis_z,
-                             const Kernel& kernel, const ElevationRange& limits)
-    : grid_(grid), axis_x_(axis_x), kernel_(kernel), sampler_(axis_x, axis_z, kernel, limits) {}
+                             const Kernel& kernel, const ElevationRange& limits, double coarser)
+    : grid_(grid),
+      axis_x_(axis_x),
+      kernel_(kernel),
+      around_(around_of(grid, axis_x, axis_z, coarser)),
+      sampler_(axis_x, axis_z, kernel, limits, around_) {}
 
 RowRange GridResampler::rows_needed(std::int64_t tile_row) const {
   RowRange range = RowRange::none();
@@ -93,7 +109,8 @@ RowRange GridResampler::rows_needed(std::int64_t tile_row) const {
 RowRange GridResampler::columns_needed(std::int64_t tile_column) const {
   RowRange range = RowRange::none();
   for (const int parity : {0, 1}) {
-    add_columns_needed(axis_x_, taps_of_tile(grid_, axis_x_, kernel_, {tile_column, 0}, parity), range);
+    add_columns_needed(axis_x_, taps_of_tile(grid_, axis_x_, kernel_, {tile_column, 0}, parity),
+                       around_.reach_x > kernel_.taps() / 2 ? around_.reach_x : 0, range);
   }
   return range;
 }
@@ -159,12 +176,25 @@ bool any_void(const char* from, std::int64_t stride, int taps) {
   return any != 0;
 }
 
+LatticeAround around_of(const TileGrid& grid, const ExactWarp& warp, double coarser) {
+  const SourcePosition steps = continued_samples(grid, warp.place());
+  return {LatticeAround::reach_of(steps.u / kContinuedSteps / coarser),
+          LatticeAround::reach_of(steps.v / kContinuedSteps / coarser),
+          grid.sigma_x() / coarser,
+          grid.sigma_z() / coarser,
+          1.0,
+          1.0,
+          &warp};
+}
+
 class WarpedResampler final : public TileResampler {
  public:
   /// The axes are those of positions (SourceAxis::of_positions, or one that wraps with spacing 1 for x). `limits` as in
   /// GridResampler.
   WarpedResampler(const TileGrid& grid, const WarpPlace& place, const SourceAxis& axis_x, const SourceAxis& axis_z,
-                  Outside outside, const Kernel& kernel, const ElevationRange& limits);
+                  Outside outside, const Kernel& kernel, const ElevationRange& limits, double coarser);
+  WarpedResampler(const WarpedResampler&) = delete;
+  WarpedResampler& operator=(const WarpedResampler&) = delete;
 
   [[nodiscard]] RowRange rows_needed(std::int64_t tile_row) const override;
   /// All: a column of tiles is no column of the source.
@@ -183,6 +213,7 @@ class WarpedResampler final : public TileResampler {
   SourceAxis axis_z_;
   Kernel kernel_;
   SourceWarp warp_;
+  LatticeAround around_;
   std::vector<SourceWarp::RowBounds> bounds_;  ///< by tile row
   float lowest_;
   float highest_;
@@ -190,15 +221,19 @@ class WarpedResampler final : public TileResampler {
 
 WarpedResampler::WarpedResampler(const TileGrid& grid, const WarpPlace& place, const SourceAxis& axis_x,
                                  const SourceAxis& axis_z, Outside outside, const Kernel& kernel,
-                                 const ElevationRange& limits)
+                                 const ElevationRange& limits, double coarser)
     : grid_(grid),
       axis_x_(axis_x),
       axis_z_(axis_z),
       kernel_(kernel),
       warp_(grid, place, reach_beyond(axis_x, axis_z, outside)),
+      around_(around_of(grid, warp_.exact(), coarser)),
       bounds_(warp_.reading_bounds()),
       lowest_(static_cast<float>(limits.min)),
-      highest_(static_cast<float>(limits.max)) {}
+      highest_(static_cast<float>(limits.max)) {
+  around_.lowest = lowest_;
+  around_.highest = highest_;
+}
 
 RowRange WarpedResampler::rows_needed(std::int64_t tile_row) const {
   const SourceWarp::RowBounds& bounds = bounds_[static_cast<std::size_t>(tile_row)];
@@ -218,11 +253,15 @@ RowRange WarpedResampler::rows_needed(std::int64_t tile_row) const {
   const auto inside = static_cast<double>(axis_z_.continued_samples());
   if (bounds.least < 0.0) add(std::min(inside, last));
   if (bounds.most > last) add(std::max(last - inside, 0.0));
+  if (around_.reach_z > kernel_.taps() / 2) {
+    range.first = std::max<std::int64_t>(range.first - around_.reach_z, 0);
+    range.last = std::min(range.last + around_.reach_z, count - 1);
+  }
   return range;
 }
 
 float WarpedResampler::sample_inside(const SourceBand& band, double u, double v) const {
-  return VoidRule(band, axis_x_, axis_z_, kernel_).at(u, v, kernel_.at(u), kernel_.at(v));
+  return VoidRule(band, axis_x_, axis_z_, kernel_, around_).at(u, v, kernel_.at(u), kernel_.at(v));
 }
 
 float WarpedResampler::sample(const SourceBand& band, double u, double v) const {
@@ -267,7 +306,7 @@ void WarpedResampler::sample_row(const SourceBand& band, const double* u, const 
         const float* from = band.heights.data() + at;
         heights[c] = near_void ? kVoidHeight : blend(taps, from, stride, columns, rows);
         if (std::isnan(heights[c])) {
-          heights[c] = VoidRule(band, axis_x_, axis_z_, kernel_).at(u[c], v[c], columns, rows);
+          heights[c] = VoidRule(band, axis_x_, axis_z_, kernel_, around_).at(u[c], v[c], columns, rows);
         } else if (kernel_.is_limited()) {
           heights[c] = held_within_cell(heights[c], from, stride);
         }
@@ -311,15 +350,16 @@ SourceAxes make_axes(const TileGrid& grid, const SourceGeometry& geometry) {
 }
 
 std::unique_ptr<TileResampler> make_grid_resampler(const TileGrid& grid, const SourceAxes& axes, const Kernel& kernel,
-                                                   const ElevationRange& limits) {
-  return std::make_unique<GridResampler>(grid, axes.x, axes.z, kernel, limits);
+                                                   const ElevationRange& limits, double coarser) {
+  return std::make_unique<GridResampler>(grid, axes.x, axes.z, kernel, limits, coarser);
 }
 
 std::unique_ptr<TileResampler> make_tile_resampler(const TileGrid& grid, const SourceGeometry& geometry,
                                                    const Kernel& kernel, const ElevationRange& limits) {
   const SourceAxes axes = make_axes(grid, geometry);
-  if (!geometry.warp) return make_grid_resampler(grid, axes, kernel, limits);
-  return std::make_unique<WarpedResampler>(grid, *geometry.warp, axes.x, axes.z, geometry.outside, kernel, limits);
+  if (!geometry.warp) return make_grid_resampler(grid, axes, kernel, limits, geometry.coarser);
+  return std::make_unique<WarpedResampler>(grid, *geometry.warp, axes.x, axes.z, geometry.outside, kernel, limits,
+                                           geometry.coarser);
 }
 
 }  // namespace isohf

@@ -49,7 +49,10 @@ struct SourceGeometry {
   double spacing_x = 1.0;  ///< world units between columns and rows
   double spacing_z = 1.0;
   Outside outside = Outside::kCover;
-  bool wraps_x = false;           ///< the East edge is the West edge
+  bool wraps_x = false;  ///< the East edge is the West edge
+  /// Steps of the grid, in those of the lattice whose triangles tell which vertices lie beside a void's samples: above 1
+  /// for vertices of a coarse plane, which are that lattice's.
+  double coarser = 1.0;
   std::optional<WarpPlace> warp;  ///< where the source was projected; first sample and spacings then say nothing
 };
 
@@ -66,6 +69,7 @@ struct SourceAxes {
                                                                  const Kernel& kernel, const ElevationRange& limits);
 /// The same where the source's rows are rows of the world, by its axes.
 [[nodiscard]] std::unique_ptr<TileResampler> make_grid_resampler(const TileGrid& grid, const SourceAxes& axes,
-                                                                 const Kernel& kernel, const ElevationRange& limits);
+                                                                 const Kernel& kernel, const ElevationRange& limits,
+                                                                 double coarser = 1.0);
 
 }  // namespace isohf

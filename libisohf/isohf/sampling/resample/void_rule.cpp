@@ -4,11 +4,12 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 
 namespace isohf {
 
 float VoidRule::at(double u, double v, const TapWeights& columns, const TapWeights& rows) const {
-  if (all_nearest_void(u, v)) return std::numeric_limits<float>::quiet_NaN();
+  if (all_nearest_void(u, v)) return beside_samples(u, v);
   Taps taps;
   double valid_weight = 0.0;
   bool whole = true;
@@ -26,7 +27,7 @@ float VoidRule::at(double u, double v, const TapWeights& columns, const TapWeigh
       if (!here) valid_weight += weight(j, i);
     }
   }
-  if (valid_weight < 0.5) return std::numeric_limits<float>::quiet_NaN();
+  if (valid_weight < 0.5) return beside_samples(u, v);
   if (!whole) complete(taps);
   double sum = 0.0;
   double missing_weight = 0.0;
@@ -55,6 +56,76 @@ float VoidRule::at(double u, double v, const TapWeights& columns, const TapWeigh
     }
   }
   return held_within(height, least, most);
+}
+
+/// Rule 7. The plane is the one of least squares, by the inverse fourth power of the distance. Its slope is shrunk where
+/// samples lie almost on one line, and its height is held near theirs.
+float VoidRule::beside_samples(double u, double v) const {
+  constexpr double kLeastWeight = 1e-9;  // of the vertex in the triangle; with less a sample lies on its side
+  constexpr double kRowLength = 0.8660254037844386;  // of column steps
+  constexpr double kSoftening = 0.05;
+  constexpr double kNoSlope = 1e-3;
+  constexpr double kHeldWithin = 0.5;  // of the samples' range, beyond it
+  std::optional<WorldPoint> here;
+  double least_weight = kLeastWeight;
+  if (around_.warp != nullptr) least_weight = -0.02;  // places of vertices are right to a hundredth of a sample
+  double nearest_weight = least_weight;
+  float nearest = std::numeric_limits<float>::quiet_NaN();
+  float least = std::numeric_limits<float>::infinity();
+  float most = -least;
+  std::array<double, 9> sums{};  // of weights, x, z, h, xx, xz, zz, xh, zh
+  const auto first_column = static_cast<std::int64_t>(std::floor(u)) - around_.reach_x + 1;
+  const auto first_row = static_cast<std::int64_t>(std::floor(v)) - around_.reach_z + 1;
+  for (std::int64_t row = first_row; row < first_row + 2 * around_.reach_z; ++row) {
+    if (row < 0 || row >= axis_z_.samples()) continue;
+    for (std::int64_t column = first_column; column < first_column + 2 * around_.reach_x; ++column) {
+      if (!axis_x_.wraps() && (column < 0 || column >= axis_x_.samples())) continue;
+      if (is_void(column, row)) continue;
+      double x = (static_cast<double>(column) - u) * around_.sample_x;
+      double z = (static_cast<double>(row) - v) * around_.sample_z;
+      if (around_.warp != nullptr) {
+        const WorldPoint there =
+            around_.warp->world_from_source({static_cast<double>(column), static_cast<double>(row)});
+        if (!here) here = around_.warp->world_from_source({u, v});
+        x = there.x - here->x;
+        z = there.z - here->z;
+      }
+      x /= 2.0 * around_.sigma_x;
+      z /= around_.sigma_z;
+      const float height = at_index(column, row);
+      const double weight = 1.0 - std::max(std::abs(z), std::abs(x) + 0.5 * std::abs(z));
+      if (weight > nearest_weight) {
+        nearest_weight = weight;
+        nearest = height;
+      }
+      least = std::min(least, height);
+      most = std::max(most, height);
+      z *= kRowLength;
+      const double square = x * x + z * z + kSoftening;
+      const double share = 1.0 / (square * square);
+      const double h = double{height};
+      const std::array<double, 9> terms{1.0, x, z, h, x * x, x * z, z * z, x * h, z * h};
+      for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += share * terms[i];
+    }
+  }
+  if (!(nearest_weight > least_weight) || kernel_.taps() == 1) return nearest;
+  const auto mean = [&](std::size_t i) { return sums[i] / sums[0]; };
+  const double xx = mean(4) - mean(1) * mean(1) + kNoSlope;
+  const double xz = mean(5) - mean(1) * mean(2);
+  const double zz = mean(6) - mean(2) * mean(2) + kNoSlope;
+  const double xh = mean(7) - mean(1) * mean(3);
+  const double zh = mean(8) - mean(2) * mean(3);
+  const double determinant = xx * zz - xz * xz;
+  const double slope_x = (xh * zz - zh * xz) / determinant;
+  const double slope_z = (zh * xx - xh * xz) / determinant;
+  const float more = static_cast<float>(kHeldWithin) * (most - least);
+  const auto plane = static_cast<float>(mean(3) - slope_x * mean(1) - slope_z * mean(2));
+  return held_within(plane, std::max(least - more, around_.lowest), std::min(most + more, around_.highest));
+}
+
+std::int64_t LatticeAround::reach_of(double samples) {
+  constexpr double kMost = 16.0;  // lattices much coarser than the source leave samples without a surface
+  return static_cast<std::int64_t>(std::clamp(std::ceil(samples), 2.0, kMost));
 }
 
 float VoidRule::held_near_samples(float height, const Taps& taps, const TapWeights& columns,

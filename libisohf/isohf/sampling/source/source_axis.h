@@ -40,6 +40,7 @@ class SourceAxis {
                                                double continued);
 
   [[nodiscard]] std::int64_t samples() const { return samples_; }
+  [[nodiscard]] double spacing_world() const { return spacing_world_; }
   [[nodiscard]] bool wraps() const { return wraps_; }
   /// The sample that stands in for sample k, any k: mirrored at the ends (mirror_index), or counted round.
   [[nodiscard]] std::int64_t index(std::int64_t k) const {

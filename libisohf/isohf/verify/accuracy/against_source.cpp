@@ -110,8 +110,8 @@ class Comparison {
       while (first_row < end_row) {
         job.throw_if_cancelled();
         const std::int64_t end = std::min(first_row + rows_at_once_, end_row);
-        const auto band =
-            reader.read({std::max<std::int64_t>(first_row - reach_, 0), std::min(end + reach_, info_.height) - 1});
+        const auto band = reader.read(
+            {std::max<std::int64_t>(first_row - 2 * reach_, 0), std::min(end + 2 * reach_, info_.height) - 1});
         compare_rows(RowSurface{tiles, tile_row}, *band, first_row, end, report, errors);
         first_row = end;
       }
@@ -147,7 +147,7 @@ class Comparison {
     const auto width = static_cast<double>(info_.width);
     const double tiles = VertexRows::memory_bytes(grid_, 0.0);
     // Of projected samples the rows under a row of tiles are many, and its tiles as doubles.
-    double rows = static_cast<double>(rows_at_once_ + 2 * reach_ + 4);
+    double rows = static_cast<double>(rows_at_once_ + 4 * reach_ + 4);
     if (warp_) {
       for (const SourceWarp::RowBounds& bounds : SourceWarp(grid_, warp_->place(), 0.0).reading_bounds(true))
         rows =
@@ -384,7 +384,9 @@ class Comparison {
     ++(void_in_source ? counts.samples_invented : counts.samples_lost);
     if (!void_in_source && is_on_outline(column, row)) return;
     const bool edge_is_void = archive_.metadata().outside == Outside::kVoid;
-    const std::int64_t reach = reach_at(column, row);
+    // A void may be on a triangle whose corners lie beside samples, each as far from one again.
+    const std::int64_t reach =
+        std::min((void_in_source ? 2 : 1) * reach_at(column, row), warp_ ? kMostReach : 2 * reach_);
     for (std::int64_t r = row - reach; r <= row + reach; ++r) {
       for (std::int64_t c = column - reach; c <= column + reach; ++c) {
         const bool inside = c >= 0 && r >= band.rows.first && c < info_.width && r <= band.rows.last;
