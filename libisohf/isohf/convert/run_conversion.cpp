@@ -40,7 +40,7 @@ namespace {
 /// Elevations of one tile beyond the limits.
 struct Outliers {
   std::int64_t vertices = 0;  ///< of all that are stored
-  std::int64_t visible = 0;   ///< of these, visible
+  std::int64_t counted = 0;   ///< of these, those that statistics count
   GridVertex worst{};
   double elevation = 0.0;  ///< of the worst
 };
@@ -63,20 +63,24 @@ struct Stages {
   const TextureStage* textures = nullptr;
 };
 
-Outliers find_outliers(const TileShape& shape, const CodeLimits& limits, double datum, std::span<const float> heights) {
+Outliers find_outliers(const CountedVertices& counted, TileIndex tile, const CodeLimits& limits, double datum,
+                       std::span<const float> heights) {
   Outliers found;
+  const TileShape& shape = counted.shape();
   // Resampled level ground is level but for the rounding of floats.
   const double largest = std::max(std::abs(limits.lowest), std::abs(limits.highest)) + std::abs(datum);
   double worst = 4.0 * largest * double{std::numeric_limits<float>::epsilon()};
   const double rounding = worst;
   std::size_t i = 0;
   for (int r = 0; r < shape.rows(); ++r) {
+    const bool is_padding = r == 0 || r + 1 == shape.rows();
+    const CountedVertices::Columns columns = is_padding ? CountedVertices::Columns{1, 0} : counted.of_row(tile, r);
     for (int c = 0; c < shape.columns(); ++c) {
       const double elevation = double{heights[i++]} + datum;
       const double beyond = std::max(limits.lowest - elevation, elevation - limits.highest);  // NaN compares false
       if (!(beyond > rounding)) continue;
       ++found.vertices;
-      found.visible += is_visible(shape, {c, r}) ? 1 : 0;
+      found.counted += c >= columns.first && c <= columns.last ? 1 : 0;
       if (beyond <= worst) continue;
       worst = beyond;
       found.worst = {c, r};
@@ -121,12 +125,12 @@ void make_tile(const Conversion& conversion, const CodeSource& source, const Cou
   }
   // Without a range from the user the codes reach over all that there is.
   if (conversion.options.z_range || counts->below + counts->above > 0) {
-    tile.outliers = find_outliers(shape, conversion.limits, conversion.datum, heights);
+    tile.outliers = find_outliers(counted, tile.index, conversion.limits, conversion.datum, heights);
   }
   EncodedTile& encoded = tile.encoded;
   encoded = encode_tile(shape, codes, conversion.options.effort);
   encoded.statistics = tile_statistics(counted, tile.index, codes, conversion.quantisation);
-  encoded.statistics.clamped = tile.outliers.visible;
+  encoded.statistics.clamped = tile.outliers.counted;
   encoded.statistics.worst_rounding = counts->worst_rounding;
   if (stages.planes != nullptr && is_new) tile.planes = stages.planes->sample(codes, encoded);
   if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(codes);

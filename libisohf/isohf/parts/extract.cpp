@@ -259,9 +259,9 @@ PartSummary extract_tiles(const std::string& archive, const std::string& output,
   });
   const Statistics before = metadata.statistics;
   metadata.statistics = total_statistics(writer.statistics());
-  // These are not known of each tile. They are no more than in the whole.
+  // These are not known of each tile. They are no more than in the whole, or than there are elevations here.
   metadata.statistics.worst_rounding = before.worst_rounding;
-  metadata.statistics.clamped = before.clamped;
+  metadata.statistics.clamped = std::min(before.clamped, metadata.statistics.vertices - metadata.statistics.voids);
   finish_copy(writer, metadata, summary);
   return summary;
 }

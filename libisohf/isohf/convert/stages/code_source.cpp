@@ -1,9 +1,13 @@
 #include "isohf/convert/stages/code_source.h"
 
+#include <cmath>
+
 namespace isohf {
 namespace {
 
+/// Where elevations are moved into a range, those beyond the source's edge are, too, and counted.
 ElevationRange limits_of(const Conversion& conversion) {
+  if (conversion.options.clamp_range) return {-HUGE_VAL, HUGE_VAL};
   return {conversion.limits.lowest - conversion.datum, conversion.limits.highest - conversion.datum};
 }
 
