@@ -527,6 +527,18 @@ bool CommandLine::parse(const Arguments& arguments) {
   return true;
 }
 
+void CommandLine::parse_recorded(const std::vector<std::pair<std::string, std::string>>& texts) {
+  for (const auto& [name, text] : texts) {
+    Option* const option = state_->find("--" + name);
+    if (option == nullptr) refuse(name + ": is not an option of an input");
+    const bool is_flag = option->values == 0;
+    if (is_flag && text != "true") refuse(fmt::format("{}: found '{}', must be true", name, text));
+    option->found.push_back({name, {text}});
+    option->origin = Origin::kCommandLine;
+  }
+  state_->take();
+}
+
 bool CommandLine::given(const std::string& name) const {
   const Option* const option = state_->find(name);
   return option != nullptr && option->origin >= Origin::kSection && option->is_set();

@@ -67,6 +67,9 @@ class CommandLine {
   /// Parses. False: help or the version was asked for and printed, there is nothing to run. Throws
   /// Error{kInvalidArgument}.
   [[nodiscard]] bool parse(const Arguments& arguments);
+  /// The same of the options that an archive records, by name without dashes, and their text: none but those that were
+  /// declared here. Throws Error{kInvalidArgument} naming the option.
+  void parse_recorded(const std::vector<std::pair<std::string, std::string>>& texts);
   /// Whether the long option is on the command line or in the command's own section of the --config file. (The file's
   /// top level is for all commands: what does not fit one of them there is no mistake.)
   [[nodiscard]] bool given(const std::string& option) const;

@@ -169,7 +169,14 @@ void find_geoid(const std::string& archive, const std::vector<std::string>& file
 std::unique_ptr<HeightSource> open_as_recorded(const VerifyCommandOptions& options, const Metadata& metadata) {
   const SourceRecord& record = metadata.source;
   const std::vector<std::string> files = expand_inputs(options.against, false);
-  RecordedInput input = recorded_input(record.options.value_or(RecordedOptions{}));
+  const RecordedOptions recorded = record.options.value_or(RecordedOptions{});
+  RecordedInput input = [&] {
+    try {
+      return recorded_input(recorded);
+    } catch (const Error& error) {
+      throw error.within(options.archive);
+    }
+  }();
   input.open.unpacked_bytes = options.work.unpacked_bytes(input.open.unpacked_bytes);
   if (!options.geoid.path.empty()) {
     input.geoid = options.geoid;

@@ -121,9 +121,12 @@ bool takes_numbers(const std::string& option) {
 RecordedOptions recorded_options(const CommandLine& line) {
   RecordedOptions recorded;
   for (auto& [name, text] : line.texts_in({"Input", "Several inputs"})) {
-    // Not what files are found by: the same samples, the same bytes.
-    if (name != "--recursive")
-      recorded.emplace_back(name.substr(2), takes_numbers(name) ? with_plain_numbers(text) : text);
+    // Not what files are found by: the same samples, the same bytes. Nor a file that holds the text of a system.
+    if (name != "--recursive") {
+      recorded.emplace_back(name.substr(2), takes_numbers(name) ? with_plain_numbers(text)
+                                            : name == "--crs"   ? system_from(text)
+                                                                : text);
+    }
   }
   for (auto& [name, text] : line.texts_in({"Ground"})) {
     if (name == "--geoid") recorded.emplace_back("geoid", file_name(text));
@@ -137,15 +140,23 @@ RecordedInput recorded_input(const RecordedOptions& recorded) {
   add_source_options(line, input.open);
   add_mosaic_options(line, input.inputs);
   add_geoid_option(line, input.geoid);
-  Arguments arguments;
+  // Nothing that an archive records names a file but the geoid, and that without a folder.
+  RecordedOptions texts;
   for (const auto& [name, text] : recorded) {
-    // The line's own, which an archive that was altered may name: they read files and print.
-    if (name == "config" || name == "help" || name == "version") {
-      throw Error(ErrorCode::kCorrupt, "the metadata record --" + name + ", which is no option of an input");
+    if (name == "crs") {
+      input.open.reference_system = text;
+    } else {
+      texts.emplace_back(name, text);
     }
-    arguments.push_back(fmt::format("--{}={}", name, text));
   }
-  static_cast<void>(line.parse(arguments));
+  try {
+    line.parse_recorded(texts);
+    if (input.geoid.path != file_name(input.geoid.path)) {
+      throw Error(ErrorCode::kInvalidArgument, {"geoid", "'" + input.geoid.path + "'", "a name without a folder", ""});
+    }
+  } catch (const Error& error) {
+    throw Error(ErrorCode::kCorrupt, error.within("isohf.json: source.options").what());
+  }
   return input;
 }
 

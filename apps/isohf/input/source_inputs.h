@@ -43,7 +43,7 @@ struct RecordedInput {
   OpenOptions open;
   GeoidRequest geoid;  ///< by its name, without a folder
 };
-/// Throws Error for what are no such options.
+/// Throws Error{kCorrupt} naming the archive's member for what are no such options.
 [[nodiscard]] RecordedInput recorded_input(const RecordedOptions& recorded);
 
 /// Inputs, opened as one source.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "formats/geotiff/tiff_bytes.h"
+#include "support/altered_archive.h"
 #include "support/rasters/degree_grid.h"
 #include "support/rasters/small_geoid.h"
 #include "support/run_program.h"
@@ -194,6 +195,27 @@ TEST_F(VerifyAgainst, WarnsOfARasterWithoutAPlace) {
   EXPECT_THAT(bare.err, HasSubstr("bare.tif: does not say where it lies"));
   ASSERT_EQ(convert("plain.bin", {"--raw", "60x45:u16le"}).exit_code, 0);
   EXPECT_EQ(verify("plain.bin").err, "");
+}
+
+TEST_F(VerifyAgainst, TakesOptionsOfAnInputAloneFromTheArchive) {
+  ASSERT_EQ(convert("land.flt", {"--valid-range", "0:9000"}).exit_code, 0);
+  AlteredArchive archive(folder / "a.isohf");
+  const auto refused = [&](const std::string& name, const std::string& text, const std::string& why) {
+    archive.metadata["source"]["options"] = {{"valid-range", "0:9000"}, {name, text}};
+    archive.write(folder / "b.isohf");
+    EXPECT_EQ(run_isohf({"verify", folder / "b.isohf", "-q"}).exit_code, 0) << "the archive is whole";
+    const RunResult result = run_isohf({"verify", folder / "b.isohf", "--against", folder / "land.flt"});
+    EXPECT_EQ(result.exit_code, 1) << result.out;
+    EXPECT_THAT(result.err, HasSubstr("b.isohf: isohf.json: source.options: " + name + ": " + why));
+    EXPECT_EQ(result.out, "");
+  };
+  for (const char* const other : {"against", "config", "geoid-file", "help", "json", "memory", "overwrite", "quiet",
+                                  "strict", "threads", "tmpdir", "verbose", "version", "INPUT", "-q", ""}) {
+    refused(other, "true", "is not an option of an input");
+  }
+  refused("geoid", "../small.pgm", "found '../small.pgm', must be a name without a folder");
+  refused("fill", "perhaps", "found 'perhaps', must be true");
+  refused("registration", "nowhere", "found 'nowhere', must be");
 }
 
 TEST_F(VerifyAgainst, OfAnExtractOnlyItsOwnGroundIsCompared) {
