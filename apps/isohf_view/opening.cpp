@@ -1,9 +1,11 @@
 #include "opening.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <vector>
@@ -26,20 +28,26 @@ std::filesystem::path temporary_folder() {
   return folder;
 }
 
-/// An archive made of a raster, which goes when this does, and with it what a conversion may leave of it.
+/// An archive made of a raster, in a folder of its own that no other user can write to. The folder goes when this does,
+/// and with it what a conversion may leave in it.
 class ScratchArchive {
  public:
-  ScratchArchive() : path_((temporary_folder() / fmt::format("isohf-view-{}.isohf", ::getpid())).string()) {}
+  ScratchArchive() : folder_((temporary_folder() / "isohf-view-XXXXXX").string()) {
+    if (::mkdtemp(folder_.data()) == nullptr) {
+      throw Error(ErrorCode::kIo,
+                  {temporary_folder().string(), std::strerror(errno), "", "TMPDIR names another folder"});
+    }
+  }
   ~ScratchArchive() {
     std::error_code ignored;
-    for (const char* ending : {"", ".part", ".part.journal"}) std::filesystem::remove(path_ + ending, ignored);
+    std::filesystem::remove_all(folder_, ignored);
   }
   ScratchArchive(const ScratchArchive&) = delete;
   ScratchArchive& operator=(const ScratchArchive&) = delete;
-  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] std::string path() const { return folder_ + "/shown.isohf"; }
 
  private:
-  std::string path_;
+  std::string folder_;
 };
 
 /// Messages name settings between backticks: options of `isohf convert`, of which this program takes none.

@@ -268,13 +268,14 @@ TEST_F(ViewProgramTest, AKilledOneLeavesNothingOfARaster) {
   const std::string folder = path("scratch");
   std::filesystem::create_directory(folder);
   // The archive has lost its name once it is open.
-  const test::RunResult killed = test::run_program(
-      {"/bin/sh", "-c",
-       "TMPDIR=\"$1\" '" ISOHF_BIN_DIR "/isohf-view' '" ISOHF_SOURCE_DIR
-       "/testdata/coast_512x384_int16.tif' -q --verify & viewer=$!\n"
-       "until ls -l /proc/$viewer/fd | grep -q 'isohf-view.*deleted'; do kill -0 $viewer || exit 9; sleep 0.02; done\n"
-       "kill -KILL $viewer",
-       "sh", folder});
+  const test::RunResult killed =
+      test::run_program({"/bin/sh", "-c",
+                         "TMPDIR=\"$1\" '" ISOHF_BIN_DIR "/isohf-view' '" ISOHF_SOURCE_DIR
+                         "/testdata/coast_512x384_int16.tif' -q --verify & viewer=$!\n"
+                         "until ls -l /proc/$viewer/fd | grep -q 'isohf-view.*deleted' && [ -z \"$(ls \"$1\")\" ]; do\n"
+                         "  kill -0 $viewer || exit 9; sleep 0.02; done\n"
+                         "kill -KILL $viewer",
+                         "sh", folder});
   EXPECT_EQ(killed.exit_code, 0) << killed.err;
   EXPECT_TRUE(std::filesystem::is_empty(folder));
 }
