@@ -212,10 +212,15 @@ class UnchangedSource final : public HeightSource {
     const Georeference& place = info_.georeference;
     const bool is_in_feet = place.unit == HorizontalUnit::kMetre && std::abs(place.metres_per_unit - 0.3048) < 1e-5;
     if (!is_in_feet || !info_.vertical_unit.empty() || options.z_scale) return;
+    constexpr int kNavd88UsFeet = 6360;
+    constexpr int kNavd88Feet = 8228;
+    const bool is_us_foot = place.metres_per_unit != 0.3048;
     info_.warnings.push_back(fmt::format(
         "its coordinates are in feet, and nothing says what its elevations are in: they are taken for metres; "
-        "`reference_system` with heights says that they are feet (EPSG:2263+6360), `z_scale` {:.10g} turns them into "
-        "metres",
+        "{}`z_scale` {:.10g} turns feet into metres",
+        place.system.epsg ? fmt::format("`reference_system` EPSG:{}+{} says that they are feet, ", *place.system.epsg,
+                                        is_us_foot ? kNavd88UsFeet : kNavd88Feet)
+                          : std::string(),
         place.metres_per_unit));
   }
 
@@ -271,7 +276,7 @@ class UnchangedSource final : public HeightSource {
   FileStamp stamp_;
 };
 
-/// A raster whose coordinates are in the system that the user names.
+/// A raster whose system the user completes.
 class PlacedSource final : public HeightSource {
  public:
   PlacedSource(std::unique_ptr<HeightSource> source, const OpenOptions& options)
@@ -284,7 +289,9 @@ class PlacedSource final : public HeightSource {
           info_.path + ": has no coordinates that `reference_system` could be about; a world file gives it some");
     }
     try {
-      take_system(options.reference_system, info_);
+      complete_system(options.reference_system, info_);
+      // Warnings that ask for it are answered.
+      std::erase_if(info_.warnings, [](const Warning& text) { return text.find("`reference_system`") != text.npos; });
     } catch (const Error& error) {
       throw error.within(info_.path);
     }

@@ -337,8 +337,8 @@ void suspect_degrees(SourceInfo& info) {
   if (place.unit == HorizontalUnit::kUnknown && place.has_origin && place.spacing_x < kFinestAsMetres &&
       place.spacing_y < kFinestAsMetres && std::abs(place.origin_x) <= 360.0 && std::abs(place.origin_y) <= 90.0) {
     info.warnings.emplace_back(
-        "the coordinates look like degrees, but no .prj beside the file says so; with one, or with `sample_spacing`, "
-        "distances would be in metres");
+        "the coordinates look like degrees, but no .prj beside the file says so; with one, or with `reference_system` "
+        "EPSG:4326, distances would be in metres");
   }
 }
 

@@ -448,9 +448,13 @@ void module_wkt(const IsohfProjSystem* system, int dialect, char* wkt) {
 }
 
 int module_same(const IsohfProjSystem* a, const IsohfProjSystem* b) {
-  // Rasters have East before North, whatever the axes.
-  return proj_is_equivalent_to_with_ctx(a->context.get(), a->horizontal.get(), b->horizontal.get(),
-                                        PJ_COMP_EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS);
+  // Rasters have East before North, whatever the axes, and heights of their own.
+  PJ_CONTEXT* const context = a->context.get();
+  const Object ours(proj_crs_demote_to_2D(context, nullptr, a->horizontal.get()));
+  const Object theirs(proj_crs_demote_to_2D(context, nullptr, b->horizontal.get()));
+  return ours && theirs ? proj_is_equivalent_to_with_ctx(context, ours.get(), theirs.get(),
+                                                         PJ_COMP_EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS)
+                        : 0;
 }
 
 /// NaN where PROJ found no place: it says infinity, or leaves an error.

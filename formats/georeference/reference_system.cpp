@@ -2,13 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <mutex>
+#include <utility>
 
 #include "formats/georeference/proj_module.h"
 #include "formats/georeference/units.h"
 #include "formats/io/text.h"
 #include "formats/module_loader.h"
+#include "isohf/base/handed_in.h"
 #include "isohf/convert.h"
 #include "isohf/error.h"
 
@@ -55,6 +59,10 @@ class ProjSystem final : public UnderstoodSystem {
     description_.authority = info.authority;
     description_.code = info.code;
     description_.datum = info.datum;
+    const std::string datum = lower_case(description_.datum);
+    description_.is_datum_known =
+        std::ranges::none_of(std::array{"unknown", "not specified", "not_specified", "undefined"},
+                             [&](const char* word) { return datum.find(word) != std::string::npos; });
     description_.is_projected = info.is_projected != 0;
     description_.is_compound = info.is_compound != 0;
     description_.unit = exact(info.metres_per_unit);
@@ -77,32 +85,11 @@ class ProjSystem final : public UnderstoodSystem {
   [[nodiscard]] double metres_per_unit() const override { return metres_per_unit_; }
   [[nodiscard]] const Ellipsoid& ellipsoid() const override { return description_.ellipsoid; }
   [[nodiscard]] bool is_same(const UnderstoodSystem& other) const override {
+    return is_same(static_cast<const ProjSystem&>(other), false);
+  }
+  [[nodiscard]] bool may_be(const UnderstoodSystem& other) const override {
     const auto& theirs = static_cast<const ProjSystem&>(other);
-    if (module_.same(system_, theirs.system_) != 0) return true;
-    // PROJ does not hold one method's variants against each other (polar stereographic by its scale, or by a parallel).
-    const Description& other_one = theirs.description_;
-    const bool is_earth = std::abs(description_.ellipsoid.semi_major_axis_m / 6378137.0 - 1.0) < 0.01;
-    if (description_.is_projected != other_one.is_projected || description_.unit != other_one.unit ||
-        !are_alike(description_.ellipsoid, other_one.ellipsoid)) {
-      return false;
-    }
-    // On other bodies an equal ellipsoid is the same datum, whatever its name.
-    if (is_earth && description_.datum != other_one.datum) return false;
-    if (!description_.is_projected) return !is_earth && description_.prime_meridian_deg == other_one.prime_meridian_deg;
-    constexpr double kSameMetres = 1e-6;
-    int compared = 0;
-    for (double latitude = -80.0; latitude <= 80.0; latitude += 20.0) {
-      for (double longitude = -170.0; longitude < 180.0; longitude += 20.0) {
-        const MapPoint ours = map_from_geo({longitude, latitude});
-        const MapPoint there = theirs.map_from_geo({longitude, latitude});
-        if (std::isnan(ours.easting) != std::isnan(there.easting)) return false;
-        if (std::isnan(ours.easting)) continue;
-        const double apart = std::hypot(ours.easting - there.easting, ours.northing - there.northing);
-        if (!(apart * description_.unit <= kSameMetres)) return false;
-        ++compared;
-      }
-    }
-    return compared > 4;
+    return is_same(theirs, !description_.is_datum_known || !theirs.description_.is_datum_known);
   }
   [[nodiscard]] std::uint64_t memory_bytes() const override { return kProjBytes; }
 
@@ -118,6 +105,37 @@ class ProjSystem final : public UnderstoodSystem {
   }
 
  private:
+  /// any_datum: whatever the datums' names, their ellipsoid makes them one.
+  [[nodiscard]] bool is_same(const ProjSystem& theirs, bool any_datum) const {
+    if (module_.same(system_, theirs.system_) != 0) return true;
+    // PROJ does not hold one method's variants against each other (polar stereographic by its scale, or by a parallel).
+    const Description& other_one = theirs.description_;
+    const bool is_earth = std::abs(description_.ellipsoid.semi_major_axis_m / 6378137.0 - 1.0) < 0.01;
+    constexpr double kSameUnit = 1e-12;
+    if (description_.is_projected != other_one.is_projected ||
+        std::abs(description_.unit / other_one.unit - 1.0) > kSameUnit ||
+        !are_alike(description_.ellipsoid, other_one.ellipsoid)) {
+      return false;
+    }
+    // On other bodies an equal ellipsoid is the same datum, whatever its name.
+    any_datum = any_datum || !is_earth;
+    if (!any_datum && description_.datum != other_one.datum) return false;
+    if (!description_.is_projected) return any_datum && description_.prime_meridian_deg == other_one.prime_meridian_deg;
+    constexpr double kSameMetres = 1e-6;
+    int compared = 0;
+    for (double latitude = -80.0; latitude <= 80.0; latitude += 20.0) {
+      for (double longitude = -170.0; longitude < 180.0; longitude += 20.0) {
+        const MapPoint ours = map_from_geo({longitude, latitude});
+        const MapPoint there = theirs.map_from_geo({longitude, latitude});
+        if (std::isnan(ours.easting) != std::isnan(there.easting)) return false;
+        if (std::isnan(ours.easting)) continue;
+        const double apart = std::hypot(ours.easting - there.easting, ours.northing - there.northing);
+        if (!(apart * description_.unit <= kSameMetres)) return false;
+        ++compared;
+      }
+    }
+    return compared > 4;
+  }
   /// PROJ's database has 15 digits of it.
   static double exact(double metres) {
     constexpr double kUsFoot = 1200.0 / 3937.0;
@@ -178,17 +196,18 @@ class PipelineMap final : public ReferenceMap {
 std::shared_ptr<const UnderstoodSystem> understand_system(const std::string& text,
                                                           std::optional<double> metres_per_unit,
                                                           std::optional<int> vertical_epsg) {
-  // The files of a mosaic name one system thousands of times.
+  // The files of a mosaic name one system thousands of times, or theirs and the user's in turn.
   static std::mutex mutex;
-  static std::string last;
-  static std::shared_ptr<const UnderstoodSystem> system;
+  static std::array<std::pair<std::string, std::shared_ptr<const UnderstoodSystem>>, 2> known;
   const std::string asked = fmt::format("{} {} {}", metres_per_unit.value_or(0.0), vertical_epsg.value_or(0), text);
   const std::lock_guard lock(mutex);
-  if (system && asked == last) return system;
-  auto found = std::make_shared<ProjSystem>(text, metres_per_unit, vertical_epsg);
-  last = asked;
-  system = std::move(found);
-  return system;
+  if (!known[0].second || known[0].first != asked) {
+    std::swap(known[0], known[1]);
+    if (!known[0].second || known[0].first != asked) {
+      known[0] = {asked, std::make_shared<ProjSystem>(text, metres_per_unit, vertical_epsg)};
+    }
+  }
+  return known[0].second;
 }
 
 std::shared_ptr<const ReferenceMap> understand_map(const std::string& text, std::optional<double> metres_per_unit) {
@@ -200,6 +219,18 @@ std::string system_text(const ReferenceSystem& system) {
   return system.epsg ? fmt::format("EPSG:{}", *system.epsg) : system.wkt;
 }
 
+std::string unit_name(const Georeference& place) {
+  if (place.unit == HorizontalUnit::kUnknown) return "an unknown unit";
+  if (place.unit == HorizontalUnit::kDegree) return "degrees";
+  return place.metres_per_unit == 1.0 ? "metres" : fmt::format("units of {} m", place.metres_per_unit);
+}
+
+std::string name_of(const Georeference& place) {
+  const ReferenceSystem& system = place.system;
+  if (system.epsg) return fmt::format("EPSG:{}", *system.epsg);
+  return system.name.empty() ? unit_name(place) : "\"" + shown_name(system.name, system.wkt) + "\"";
+}
+
 namespace {
 
 [[noreturn]] void refuse(const std::string& name, const char* why, const char* remedy) {
@@ -209,7 +240,8 @@ namespace {
 void take_vertical(const UnderstoodSystem::Description& found, SourceInfo& info) {
   if (found.vertical_name.empty()) return;
   if (found.metres_per_vertical_unit < 0.0) {
-    refuse(found.vertical_name, "counts depths downwards", "isohf reads heights (`z_scale` -1 turns them)");
+    refuse(found.vertical_name, "counts depths downwards",
+           "isohf reads heights; name the system without it, and give `z_scale` -1");
   }
   info.georeference.system.vertical_datum = found.vertical_name;
   info.georeference.system.vertical_epsg = found.vertical_epsg;
@@ -244,6 +276,111 @@ void take_system(const std::string& text, SourceInfo& info) {
   }
   place.system = system;
   take_vertical(found, info);
+}
+
+namespace {
+
+/// The system of a file; null where it names none, or PROJ does not understand it.
+std::shared_ptr<const UnderstoodSystem> understood_if(const std::string& text) {
+  try {
+    return text.empty() ? nullptr : understand_system(text);
+  } catch (const Error&) {
+    return nullptr;
+  }
+}
+
+/// Whether the coordinates of a file, in the system or unit that it names, can be those of `theirs` as well.
+bool may_lie_in(const Georeference& own, const Georeference& theirs, const UnderstoodSystem& understood) {
+  if (own.unit != HorizontalUnit::kUnknown && own.unit != theirs.unit) return false;
+  const std::string said = system_text(own.system);
+  if (said == system_text(theirs.system)) return true;
+  if (const auto system = understood_if(said)) return understood.may_be(*system);
+  constexpr double kSameUnit = 1e-5;  // feet of either kind go by one name
+  constexpr double kSameRadius = 1e-6;
+  const auto apart = [](double a, double b) { return std::abs(a / b - 1.0); };
+  if (own.unit == HorizontalUnit::kMetre && apart(own.metres_per_unit, theirs.metres_per_unit) > kSameUnit)
+    return false;
+  return !own.system.semi_major_axis_m ||
+         apart(*own.system.semi_major_axis_m, theirs.system.semi_major_axis_m.value_or(1.0)) < kSameRadius;
+}
+
+/// Whether heights of one system are above something else than those of the other. Names differ from format to format:
+/// "EGM96", "EGM96 height", "NAVD88 height (ftUS)"; those that are no name of a surface contradict nothing.
+bool have_other_heights(const ReferenceSystem& own, const ReferenceSystem& theirs) {
+  const auto surface = [](const std::string& name) {
+    const std::string word = lower_case(name.substr(0, name.find(' ')));
+    for (const char* const known : {"egm84", "egm96", "egm2008", "navd88", "the"}) {
+      if (word == known) return word;
+    }
+    return std::string();
+  };
+  const std::string ours = surface(own.vertical_datum);
+  const std::string other = surface(theirs.vertical_datum);
+  if (!ours.empty() && ours == other) return false;
+  if (own.vertical_epsg && theirs.vertical_epsg) return *own.vertical_epsg != *theirs.vertical_epsg;
+  const bool is_one_ellipsoidal = own.vertical_datum == kAboveEllipsoid || theirs.vertical_datum == kAboveEllipsoid;
+  return !own.vertical_datum.empty() && (is_one_ellipsoidal || (!ours.empty() && !other.empty()));
+}
+
+/// Whether a file's words for a system say as much as the user's.
+bool keeps_words(const ReferenceSystem& own, const ReferenceSystem& theirs) {
+  if (!own.epsg && theirs.epsg) return false;
+  const auto system = own.epsg == theirs.epsg ? nullptr : understood_if(system_text(own));
+  return !system || system->description().is_datum_known;
+}
+
+/// Degrees that none are: what the file says is no system of its coordinates.
+bool is_impossible(const SourceInfo& info) {
+  if (info.georeference.unit != HorizontalUnit::kDegree) return false;
+  try {
+    require_source(info);
+    return false;
+  } catch (const Error&) {
+    return true;
+  }
+}
+
+}  // namespace
+
+void complete_system(const std::string& text, SourceInfo& info) {
+  const auto understood = understand_system(text);
+  SourceInfo there = info;
+  take_system(text, there);
+  const Georeference& own = info.georeference;
+  Georeference& theirs = there.georeference;
+  const std::string said = system_text(own.system);
+  const bool is_wrong = is_impossible(info);
+  const std::string given = shortened(text);
+  const std::string word = given.find_first_of(" \"") == std::string::npos ? given : "'" + given + "'";
+  const std::string way_out = "if the file is wrong, correct a copy with gdal_translate -a_srs " + word;
+  if (!is_wrong && !may_lie_in(own, theirs, *understood)) {
+    const bool can_project =
+        theirs.unit == HorizontalUnit::kMetre && (!said.empty() || own.unit == HorizontalUnit::kDegree);
+    const std::string project =
+        can_project ? fmt::format("`projection` {} projects it; ", theirs.system.epsg ? name_of(theirs) : word) : "";
+    throw Error(ErrorCode::kInvalidArgument,
+                {"", fmt::format("is in {}, which `reference_system` {} contradicts", name_of(own), given), "",
+                 project + way_out});
+  }
+  const std::string& heights = understood->description().vertical_name;
+  if (!heights.empty() && have_other_heights(own.system, theirs.system)) {
+    throw Error(ErrorCode::kInvalidArgument,
+                {"",
+                 fmt::format("has heights above {}, which `reference_system` contradicts with {}",
+                             own.system.vertical_datum, heights),
+                 "", "name the system without heights; " + way_out});
+  }
+  // The same system: in the file's words, unless these lack its datum or code. Coordinates may be in a unit of their own.
+  if (!said.empty() && !is_wrong) {
+    theirs.metres_per_unit = own.metres_per_unit;
+    if (keeps_words(own.system, theirs.system)) {
+      ReferenceSystem system = own.system;
+      system.vertical_datum = theirs.system.vertical_datum;
+      system.vertical_epsg = theirs.system.vertical_epsg;
+      theirs.system = std::move(system);
+    }
+  }
+  info = std::move(there);
 }
 
 void take_heights(int vertical_epsg, SourceInfo& info) {

@@ -18,6 +18,7 @@ class UnderstoodSystem : public ReferenceMap {
     std::string authority;
     std::string code;  ///< "EPSG" and "32632"; empty where the text gives none
     std::string datum;
+    bool is_datum_known = true;  ///< false: nothing but an ellipsoid is named
     bool is_projected = false;
     bool is_compound = false;         ///< heights belong to it
     double unit = 1.0;                ///< of the system's axes: metres, or degrees where it is not projected
@@ -34,6 +35,8 @@ class UnderstoodSystem : public ReferenceMap {
   [[nodiscard]] virtual const Description& description() const = 0;
   /// Whether both are one system, however they are spelled and named.
   [[nodiscard]] virtual bool is_same(const UnderstoodSystem& other) const = 0;
+  /// The same, but a datum that one of them leaves unknown may be the other's.
+  [[nodiscard]] virtual bool may_be(const UnderstoodSystem& other) const = 0;
 };
 
 /// Understands "EPSG:2154", WKT of any version and dialect, PROJ strings and PROJJSON, by the module isohf_proj.so,
@@ -82,10 +85,19 @@ struct WayToSystem {
 /// What names the system to PROJ: "EPSG:n", or the WKT; empty where a file has neither.
 [[nodiscard]] std::string system_text(const ReferenceSystem& system);
 
+/// For messages: what coordinates are in, "degrees"; and of which system, "EPSG:n", else its name, else that.
+[[nodiscard]] std::string unit_name(const Georeference& place);
+[[nodiscard]] std::string name_of(const Georeference& place);
+
 /// Takes `text`, which understand_system() understands, for what the coordinates of a raster are in, whatever its file
 /// says, and for its heights where it speaks of them. Throws what that throws; Error{kUnsupported} for angles that are
 /// no degrees from Greenwich, and for depths.
 void take_system(const std::string& text, SourceInfo& info);
+
+/// Completes what a raster's file says of its reference system by what the user says: a system where it has none, a
+/// datum that it leaves unknown, a code, heights. Throws what take_system() throws, and Error{kInvalidArgument} where
+/// the two contradict each other.
+void complete_system(const std::string& text, SourceInfo& info);
 
 /// Unit and name of the heights of a vertical system by its code; nothing where there is no module.
 void take_heights(int vertical_epsg, SourceInfo& info);

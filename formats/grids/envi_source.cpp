@@ -129,7 +129,7 @@ class EnviSource final : public DescribedSource {
       return;
     info_.warnings.push_back(
         loss(fmt::format("{}: map info names \"{}\" and a datum that isohf does not take from there, and there "
-                         "is no coordinate system string: the reference system is left out; give `crs`",
+                         "is no coordinate system string: the reference system is left out; give `reference_system`",
                          header_, one_line(projection))));
   }
 

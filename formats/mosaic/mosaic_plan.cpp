@@ -48,18 +48,6 @@ void refuse_duplicates(const std::vector<std::string>& paths) {
   }
 }
 
-std::string unit_name(const Georeference& place) {
-  switch (place.unit) {
-    case HorizontalUnit::kDegree:
-      return "degrees";
-    case HorizontalUnit::kMetre:
-      return place.metres_per_unit == 1.0 ? "metres" : fmt::format("units of {} m", place.metres_per_unit);
-    case HorizontalUnit::kUnknown:
-      break;
-  }
-  return "an unknown unit";
-}
-
 bool states_system(const ReferenceSystem& system) {
   return system.epsg || !system.wkt.empty() || !system.name.empty() || system.semi_major_axis_m;
 }
@@ -252,9 +240,11 @@ class Survey {
              (each.unit == HorizontalUnit::kMetre && !system_text(each.system).empty());
     };
     if (!is_known(place) || !is_known(systems_.front())) {
-      refuse(path, why +
-                       "; not both of the reference systems are known, so that they cannot be joined: `crs` says "
-                       "what all are in, or leave this file out");
+      refuse(
+          path,
+          why +
+              "; not both of the reference systems are known, so that they cannot be joined: `reference_system` says "
+              "what all are in, or leave this file out");
     }
     if (!joins_) refuse(path, why + "; `projection` joins them on one map (auto, EPSG:n, ...), or leave this file out");
     systems_.push_back(place);
@@ -281,9 +271,13 @@ class Survey {
       const auto words = [](const SourceInfo& of) {
         return of.vertical_unit.empty() ? std::string("a unit that nothing states") : of.vertical_unit;
       };
-      refuse(path, fmt::format("its elevations are in {}, those of {} in {}; convert one of them first (gdal_calc), or "
-                               "`reference_system` with heights (EPSG:2263+6360) says what all are in",
-                               words(info), first_, words(whole)));
+      const bool is_one_unknown = info.vertical_unit.empty() || whole.vertical_unit.empty();
+      refuse(path, fmt::format("its elevations are in {}, those of {} in {}; convert one of them first (gdal_calc){}",
+                               words(info), first_, words(whole),
+                               is_one_unknown && place.system.epsg
+                                   ? fmt::format(", or say what all are in, as by `reference_system` EPSG:{}+6360",
+                                                 *place.system.epsg)
+                                   : ""));
     }
     if (whole.vertical_unit.empty()) whole.vertical_unit = info.vertical_unit;
   }
@@ -405,11 +399,6 @@ class Joining {
     if (!system.semi_major_axis_m) return {};
     return {*system.semi_major_axis_m, system.inverse_flattening.value_or(0.0)};
   }
-  static std::string name_of(const Georeference& place) {
-    if (place.system.epsg) return fmt::format("EPSG:{}", *place.system.epsg);
-    return place.system.name.empty() ? unit_name(place) : "\"" + place.system.name + "\"";
-  }
-
   const std::vector<Georeference>& systems_;
   std::vector<GeoExtent> grounds_;
   std::vector<std::shared_ptr<const ReferenceMap>> maps_;  ///< nullptr: degrees

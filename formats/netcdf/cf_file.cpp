@@ -236,7 +236,7 @@ class CfReader {
       place.unit = HorizontalUnit::kDegree;
       const std::string figure = system == nullptr ? "" : figure_of(*system);
       if (figure.empty()) {
-        place.system = wgs84_system();  // what CF means where nothing else stands
+        if (!is_system_given_) place.system = wgs84_system();  // what CF means where nothing else stands
       } else {
         read_system_text("+proj=longlat" + figure + " +no_defs +type=crs", info_.path, info_);
       }
@@ -246,7 +246,7 @@ class CfReader {
       if (kind.empty()) return;
       info_.warnings.push_back(loss(
           fmt::format("its grid mapping {} comes without crs_wkt: the reference system is left out", printable(kind))));
-    } else if (!unit.empty() && unit != "1" && unit != "user_x_unit" && !is_system_given_) {  // the latter of older GMT
+    } else if (!unit.empty() && unit != "1" && unit != "user_x_unit") {  // the latter of older GMT
       info_.warnings.push_back(
           loss(fmt::format("its coordinates are in \"{}\", which is no unit that isohf knows: they are kept as numbers "
                            "(`reference_system` says what they are)",

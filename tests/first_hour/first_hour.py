@@ -195,3 +195,47 @@ def read_png(name):
         pixels += here
         above = here
     return columns, rows, channels, pixels
+
+
+def write_netcdf(name, columns, rows, height, west, north, spacing, units=("degrees_east", "degrees_north"),
+                 attributes=(), mapping=()):
+    """A netCDF file (classic) of int16 areas with coordinates x and y, `units` being theirs. `attributes` of the
+    variable z and `mapping`, those of its grid mapping, are pairs of a name and a text or number."""
+    def padded(data):
+        return data + b"\0" * (-len(data) % 4)
+
+    def named(text):
+        return struct.pack(">L", len(text)) + padded(text.encode())
+
+    def listed(pairs):
+        if not pairs:
+            return struct.pack(">LL", 0, 0)
+        body = struct.pack(">LL", 12, len(pairs))
+        for key, value in pairs:
+            body += named(key)
+            if isinstance(value, str):
+                body += struct.pack(">LL", 2, len(value)) + padded(value.encode())
+            else:
+                body += struct.pack(">LLd", 6, 1, value)
+        return body
+
+    xs = struct.pack(f">{columns}d", *(west + (x + 0.5) * spacing for x in range(columns)))
+    ys = struct.pack(f">{rows}d", *(north - (y + 0.5) * spacing for y in range(rows)))
+    zs = padded(struct.pack(f">{columns * rows}h", *(height(x, y) for y in range(rows) for x in range(columns))))
+    more = [("grid_mapping", "map")] if mapping else []
+    variables = [("x", [1], [("units", units[0])], 6, xs), ("y", [0], [("units", units[1])], 6, ys),
+                 ("z", [0, 1], list(attributes) + more, 3, zs)]
+    if mapping:
+        variables.append(("map", [], list(mapping), 4, struct.pack(">l", 0)))
+
+    def head(begin):
+        text = b"CDF\1" + struct.pack(">LLL", 0, 10, 2) + named("y") + struct.pack(">L", rows)
+        text += named("x") + struct.pack(">L", columns) + struct.pack(">LLLL", 0, 0, 11, len(variables))
+        for variable, dimensions, pairs, kind, data in variables:
+            text += named(variable) + struct.pack(f">L{len(dimensions)}L", len(dimensions), *dimensions)
+            text += listed(pairs) + struct.pack(">LLL", kind, len(data), begin)
+            begin += len(data)
+        return text
+
+    (FOLDER / name).write_bytes(head(len(head(0))) + b"".join(variable[4] for variable in variables))
+    return FOLDER / name

@@ -192,11 +192,16 @@ std::unique_ptr<HeightSource> open_as_recorded(const VerifyCommandOptions& optio
     onto.kind = ProjectionKind::kSystem;
     onto.system = system;
   }
-  OpenedInputs opened = open_inputs(files, input.inputs, input.open, options.work);
   GroundRequest ground;
-  const bool lost_a_column = opened.source->info().width == record.width + 1;
-  ground.wrap = metadata.wraps_x || lost_a_column ? Wrap::kAlways : Wrap::kNever;
-  return laid_out(std::move(opened.source), input.geoid, ground, true);
+  try {
+    OpenedInputs opened = open_inputs(files, input.inputs, input.open, options.work);
+    const bool lost_a_column = opened.source->info().width == record.width + 1;
+    ground.wrap = metadata.wraps_x || lost_a_column ? Wrap::kAlways : Wrap::kNever;
+    return laid_out(std::move(opened.source), input.geoid, ground, true);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kInvalidArgument || input.open.reference_system.empty()) throw;
+    throw error.within(options.archive + ": was made with --crs");
+  }
 }
 
 /// What of the measured error is more than was allowed; empty where nothing is.

@@ -106,8 +106,8 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
               "Set the distance of neighbouring samples, instead of the file's: metres, or with a unit as in 100ft",
               [&](const std::string& text) { options.spacing = parse_length(text).value; });
   line.option("--crs", "SYSTEM",
-              "Take the coordinates for those of this reference system, whatever the file says: EPSG:2154, WKT, a PROJ "
-              "string, or a file with one of them",
+              "Reference system of an input that names none, or not its datum or heights: EPSG:2154, WKT, a PROJ "
+              "string, or a file with one of them; a contradiction is an error",
               [&](const std::string& text) { options.reference_system = system_from(text); });
   line.exclusive({"--crs", "--sample-spacing"});
 }

@@ -159,7 +159,7 @@ struct OpenOptions {
   std::optional<double> z_scale;             ///< elevation = raw * z_scale + z_offset; overrides the file's
   std::optional<double> z_offset;
   std::optional<double> spacing;  ///< sample spacing in metres, for files that do not say; overrides
-  /// "EPSG:2154", WKT, a PROJ string: what the coordinates are in; overrides. Understood by the PROJ module.
+  /// "EPSG:2154", WKT, a PROJ string: completes what the file says of its system. Understood by the PROJ module.
   std::string reference_system;
   std::optional<RawLayout> raw;  ///< the file is nothing but these samples, whatever its name and content say
   /// What all files that are open at once may hold of the contents that they have packed (.gz, .zip): contents that

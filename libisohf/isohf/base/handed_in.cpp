@@ -18,8 +18,8 @@ void require_degrees(const std::string& path, const Georeference& place, std::in
   constexpr double kMostLatitude = 180.0;
   const auto require = [&](bool holds, const std::string& what, const std::string& found, const char* required) {
     if (holds) return;
-    throw Error(ErrorCode::kInvalidArgument, {path + ": " + what, found + " degrees", required,
-                                              "`reference_system` says what else its coordinates are"});
+    throw Error(ErrorCode::kInvalidArgument,
+                {path + ": " + what, found + " degrees", required, "`reference_system` says what they are instead"});
   };
   require(place.spacing_x <= kTurn && place.spacing_y <= kTurn, "the spacing",
           fmt::format("{:.9g} x {:.9g}", place.spacing_x, place.spacing_y), "360 at most");
@@ -105,8 +105,7 @@ std::string latitude_warning(const SourceInfo& info) {
   const double beyond = kPole + 0.01 * place.spacing_y;
   if (north <= beyond && south >= -beyond) return {};
   return fmt::format(
-      "its rows lie at latitudes from {:.10g} to {:.10g}, and there is no ground beyond 90: `bbox` leaves "
-      "rows out, `reference_system` says what else its coordinates are",
+      "its rows lie at latitudes from {:.10g} to {:.10g}, and there is no ground beyond 90: `bbox` leaves rows out",
       south, north);
 }
 

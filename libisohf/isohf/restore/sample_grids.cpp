@@ -342,10 +342,12 @@ std::string describe_system(const ReferenceSystem& system) {
 }
 
 void refuse_system(const SourceInfo& other, const ReferenceSystem& own) {
+  const auto& code = other.georeference.system.epsg;
   refuse(
       fmt::format("{}: is in {}, the archive's source in {}; bring it to that (gdalwarp), or write all of the archive "
-                  "in its system, with `crs` for `like`",
-                  other.path, describe_system(other.georeference.system), describe_system(own)));
+                  "in its system, with `projection` {} instead of `like`",
+                  other.path, describe_system(other.georeference.system), describe_system(own),
+                  code ? fmt::format("EPSG:{}", *code) : "SYSTEM"));
 }
 
 std::optional<Turn> turn_of(const Metadata& metadata) {

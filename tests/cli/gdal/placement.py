@@ -495,7 +495,10 @@ def ellipsoidal(isohf, folder):
         isohf.must("export", folder / "e.isohf", folder / "back.tif", "--overwrite", "-q")
         own = gdal.Open(str(folder / "back.tif")).GetSpatialRef()
         check(own.IsSame(system(text), ["IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES"]) and not own.IsCompound(), f"{text}: {own.ExportToWkt()}")
-    isohf.must("convert", folder / "e.tif", "-o", folder / "e.isohf", "--overwrite", "-q", "--lossless", "--crs", "EPSG:4979")
+    # The last is NAD83(2011).
+    isohf.refuses("--crs EPSG:4979 contradicts", "convert", folder / "e.tif", "-o", folder / "n.isohf", "--crs", "EPSG:4979")
+    write(folder / "flat.tif", "EPSG:4326", 9.0, 46.0, 30.0, (9.0, 46.0), 0, 40)
+    isohf.must("convert", folder / "flat.tif", "-o", folder / "e.isohf", "--overwrite", "-q", "--lossless", "--crs", "EPSG:4979")
     check("heights above the ellipsoid" in isohf.must("info", folder / "e.isohf").stdout, "--crs EPSG:4979: no heights above the ellipsoid")
 
 
@@ -525,7 +528,7 @@ def feet(isohf, folder):
         found = json.loads(said.stdout)["metadata"]["units"]["vertical"]
         check(found == (unit or "unknown"), f"{name} {options}: another unit than {unit}: {found}")
     isohf.refuses("--z-scale 0.304800609601", "plan", folder / "both.tif", "--crs", "EPSG:2263+5703")
-    isohf.refuses("--z-scale 0.304800609601", "convert", folder / "both.tif", "-o", folder / "n.isohf", "--crs", "EPSG:32618+5773")
+    isohf.refuses("--crs EPSG:32618+5773 contradicts", "convert", folder / "both.tif", "-o", folder / "n.isohf", "--crs", "EPSG:32618+5773")
 
 
 def voids_of_files(isohf, folder):

@@ -51,12 +51,18 @@ TEST_F(CrsOption, TakesACodeWktAProjStringAndAFile) {
   EXPECT_EQ(crs().at("wkt"), by_string.at("wkt"));
 }
 
-TEST_F(CrsOption, WinsOverTheFileAndMovesNoSample) {
-  write_text(folder_ / "grid.prj", "Projection UTM\nZone 11\nDatum WGS84\nUnits METERS\n");
+TEST_F(CrsOption, CompletesTheFileAndMovesNoSample) {
+  // It names the ellipsoid alone.
+  write_text(folder_ / "grid.prj", "Projection UTM\nZone 11\nDatum WGS72\nUnits METERS\n");
   ASSERT_EQ(run_isohf({"convert", grid_, archive_, "--quiet"}).err, "");
   const json as_filed = crs();
-  ASSERT_EQ(convert("EPSG:32612").err, "");
-  EXPECT_EQ(crs().at("epsg"), 32612);
+  for (const char* const other : {"EPSG:32611", "EPSG:32212", "EPSG:4322"}) {
+    const RunResult refused = convert(other);
+    EXPECT_EQ(refused.exit_code, 2) << other;
+    EXPECT_THAT(refused.err, HasSubstr(std::string("which --crs ") + other + " contradicts"));
+  }
+  ASSERT_EQ(convert("EPSG:32211").err, "");
+  EXPECT_EQ(crs().at("epsg"), 32211);
   EXPECT_EQ(crs().at("origin_x"), as_filed.at("origin_x"));
   EXPECT_EQ(crs().at("spacing_x"), as_filed.at("spacing_x"));
   // The archive records it, as all that was said of the input.

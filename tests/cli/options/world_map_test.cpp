@@ -114,8 +114,9 @@ TEST(ReferenceSystemOption, TakesNoWordForAName) {
     EXPECT_NE(refused.exit_code, 0) << word;
     EXPECT_NE(refused.err.find(word), std::string::npos) << refused.err;
   }
-  for (const char* const name : {"WGS84", "WGS 84", "ETRS89", "EPSG:4258"})
-    EXPECT_EQ(convert(name).exit_code, 0) << name;
+  for (const char* const name : {"WGS84", "WGS 84", "EPSG:4326"}) EXPECT_EQ(convert(name).exit_code, 0) << name;
+  std::filesystem::remove(folder / "a.prj");
+  for (const char* const name : {"ETRS89", "EPSG:4258"}) EXPECT_EQ(convert(name).exit_code, 0) << name;
 }
 
 // The middle column and row of this grid are edges of tiles: both extracts have them, and no nodata.

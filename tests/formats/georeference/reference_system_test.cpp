@@ -102,6 +102,34 @@ TEST_F(UnderstandSystem, TakesWktOfEveryVersionAndProjStrings) {
   }
 }
 
+TEST_F(UnderstandSystem, ADatumThatIsLeftUnknownMayBeAnyOfItsEllipsoid) {
+  struct Case {
+    const char* one;
+    const char* other;
+    bool is_same;
+    bool may_be;
+  };
+  for (const Case& of : {Case{"EPSG:4326", "EPSG:4979", true, true},
+                         {"EPSG:4326", "+proj=longlat +datum=WGS84 +towgs84=0,0,0", true, true},
+                         {"EPSG:4326", "+proj=longlat +ellps=WGS84", false, true},
+                         {"EPSG:4267", "+proj=longlat +ellps=clrk66", false, true},
+                         {"EPSG:4267", "+proj=longlat +ellps=WGS84", false, false},
+                         {"EPSG:4326", "EPSG:4258", false, false},
+                         {"EPSG:23032", "+proj=utm +zone=32 +ellps=intl", false, true},
+                         {"EPSG:23032", "+proj=utm +zone=33 +ellps=intl", false, false},
+                         {"EPSG:23032", "+proj=utm +zone=32 +ellps=intl +units=km", false, false},
+                         {"EPSG:32632", "EPSG:25832", false, false},
+                         {"EPSG:32632", "EPSG:4326", false, false},
+                         {"EPSG:3413", "+proj=stere +lat_0=90 +lat_ts=70 +lon_0=-45 +datum=WGS84", true, true}}) {
+    const auto one = understand_system(of.one);
+    const auto other = understand_system(of.other);
+    EXPECT_EQ(one->is_same(*other), of.is_same) << of.one << ' ' << of.other;
+    EXPECT_EQ(other->is_same(*one), of.is_same) << of.one << ' ' << of.other;
+    EXPECT_EQ(one->may_be(*other), of.may_be) << of.one << ' ' << of.other;
+    EXPECT_EQ(other->may_be(*one), of.may_be) << of.one << ' ' << of.other;
+  }
+}
+
 TEST_F(UnderstandSystem, RefusesInOneLineWhatIsNoSystem) {
   for (const char* text :
        {"EPSG:999999", "nonsense", "", "EPSG:5773", "LOCAL_CS[\"a\",UNIT[\"metre\",1]]", "EPSG:2053"}) {
