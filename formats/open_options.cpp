@@ -51,17 +51,17 @@ void override_spacing(SourceInfo& info, double spacing_m) {
   place.spacing_x = place.spacing_y = spacing_m;
 }
 
-/// A scale that is the unit's size in metres turns the elevations into metres.
-void override_scale(SourceInfo& info, double scale) {
-  const double in_metres = info.z_scale * info.metres_per_vertical_unit;
+/// On top of the file's own. A scale that is the unit's size in metres turns the elevations into metres.
+void scale_elevations(SourceInfo& info, double scale) {
   constexpr double kSameUnit = 1e-4;  // 0.3048 for US survey feet as well
-  if (info.metres_per_vertical_unit != 1.0 && std::abs(scale / in_metres - 1.0) < kSameUnit) {
+  if (info.metres_per_vertical_unit != 1.0 && std::abs(scale / info.metres_per_vertical_unit - 1.0) < kSameUnit) {
     info.warnings.push_back(
         fmt::format("the vertical scale {} turns elevations in {} into metres", scale, info.vertical_unit));
     info.vertical_unit = "metre";
     info.metres_per_vertical_unit = 1.0;
   }
-  info.z_scale = scale;
+  info.z_scale *= scale;
+  info.z_offset = info.z_offset * scale + 0.0;  // never -0
 }
 
 }  // namespace
@@ -103,8 +103,8 @@ void apply_open_options(SourceInfo& info, const OpenOptions& options) {
   }
   if (options.registration) info.georeference.registration = *options.registration;
   if (!options.void_values.empty()) override_voids(info, options.void_values);
-  if (options.z_scale) override_scale(info, *options.z_scale);
-  if (options.z_offset) info.z_offset = *options.z_offset;
+  if (options.z_scale) scale_elevations(info, *options.z_scale);
+  if (options.z_offset) info.z_offset += *options.z_offset;
   if (options.spacing) override_spacing(info, *options.spacing);
 }
 

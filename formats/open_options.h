@@ -22,7 +22,8 @@ inline constexpr double kBeyondAnyGround = 1e30;
 /// Makes them voids where a raster of floats declares none.
 void bound_undeclared_voids(SourceInfo& info);
 
-/// Lets what the user says override what the file says; every reader calls it last, on a complete `info`.
+/// Lets what the user says override what the file says; every reader calls it last and once, on a complete `info`:
+/// z_scale and z_offset act on what the file's own make.
 ///
 /// registration replaces only the meaning of the samples: the place of sample (0, 0) stays where the file puts it.
 /// void_values replace the list of void values; the valid range of special pixels stays.

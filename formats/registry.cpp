@@ -311,13 +311,11 @@ class PlacedSource final : public HeightSource {
     constexpr double kSame = 1e-9;
     const double factor = own.metres_per_vertical_unit / info_.metres_per_vertical_unit;
     if (own.vertical_unit.empty() || std::abs(factor - 1.0) < kSame) return;
-    std::string remedy = fmt::format("`z_scale` {:.12g}", own.z_scale * factor);
-    if (own.z_offset != 0.0) remedy += fmt::format(" `z_offset` {:.12g}", own.z_offset * factor);
     throw Error(
         ErrorCode::kInvalidArgument,
         {info_.path,
          fmt::format("elevations in {}, which `reference_system` takes for {}", own.vertical_unit, info_.vertical_unit),
-         "the same unit", remedy + " turns them, a system without heights leaves them"});
+         "the same unit", fmt::format("`z_scale` {:.12g} converts them, a system without heights keeps them", factor)});
   }
 
   std::unique_ptr<HeightSource> source_;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "isohf/base/sample.h"
@@ -55,10 +56,13 @@ TEST(ApplyOpenOptions, AScaleOfTheUnitsSizeMakesMetres) {
     SourceInfo info = sample_info(SampleType::kInt16);
     info.vertical_unit = "foot";
     info.metres_per_vertical_unit = 0.3048;
+    info.z_scale = 0.5;
+    info.z_offset = 100.0;
     OpenOptions options;
     options.z_scale = scale;
     apply_open_options(info, options);
-    EXPECT_EQ(info.z_scale, scale);
+    EXPECT_EQ(info.z_scale, 0.5 * scale);
+    EXPECT_EQ(info.z_offset, 100.0 * scale);
     EXPECT_EQ(info.vertical_unit, unit);
     EXPECT_EQ(info.metres_per_vertical_unit, info.vertical_unit == "metre" ? 1.0 : 0.3048);
     EXPECT_EQ(info.warnings.size(), info.vertical_unit == "metre" ? 1U : 0U);
@@ -78,6 +82,23 @@ TEST(ApplyOpenOptions, OverridesWhatTheFileSays) {
   EXPECT_EQ(info.z_scale, 0.5);
   EXPECT_EQ(info.z_offset, 7.0);
   EXPECT_TRUE(info.warnings.empty());
+}
+
+TEST(ApplyOpenOptions, ScaleAndOffsetActOnWhatTheFileStates) {
+  const auto with = [](std::optional<double> scale, std::optional<double> offset) {
+    SourceInfo info = sample_info(SampleType::kInt16);
+    info.z_scale = -0.25;
+    info.z_offset = 8.0;
+    OpenOptions options;
+    options.z_scale = scale;
+    options.z_offset = offset;
+    apply_open_options(info, options);
+    return std::pair(info.z_scale, info.z_offset);
+  };
+  EXPECT_EQ(with({}, {}), std::pair(-0.25, 8.0));
+  EXPECT_EQ(with(2.0, {}), std::pair(-0.5, 16.0));
+  EXPECT_EQ(with({}, -3.0), std::pair(-0.25, 5.0));
+  EXPECT_EQ(with(-2.0, 1.0), std::pair(0.5, -15.0));
 }
 
 TEST(ApplyOpenOptions, LeavesEverythingWithoutOptions) {

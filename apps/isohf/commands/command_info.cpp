@@ -198,6 +198,16 @@ std::string describe_members(const ArchiveReader& archive) {
   return text;
 }
 
+std::string describe_options(const std::vector<std::pair<std::string, std::string>>& options) {
+  constexpr std::size_t kMostShown = 60;  // WKT has thousands
+  std::string text;
+  for (const auto& [name, value] : options) {
+    const std::string shown = value.size() > kMostShown ? value.substr(0, kMostShown) + "..." : value;
+    text += fmt::format("{}--{}{}", text.empty() ? "" : " ", name, shown == "true" ? "" : " " + shown);
+  }
+  return text;
+}
+
 std::string describe_mosaic(const MosaicRecord& mosaic) {
   const auto shown = static_cast<std::int64_t>(mosaic.first_names.size());
   std::string names = fmt::format("{}", fmt::join(mosaic.first_names, ", "));
@@ -274,10 +284,14 @@ std::string describe_archive(const ArchiveReader& archive) {
       fmt::format(
           "{} on the source's ground, {} void{}", describe_count(statistics.vertices), describe_count(statistics.voids),
           statistics.clamped > 0 ? fmt::format(", {} moved into the range", describe_count(statistics.clamped)) : ""));
+  const bool is_scaled = source.z_scale != 1.0 || source.z_offset != 0.0;
   say("source",
-      fmt::format("{}: {}, {} x {} {}{}, registered as {}", source.name, source.format, source.width, source.height,
+      fmt::format("{}: {}, {} x {} {}{}{}, registered as {}", source.name, source.format, source.width, source.height,
                   source.sample_type, source.channel.empty() ? "" : ", channel " + source.channel,
+                  is_scaled ? fmt::format(", elevation = sample * {:.12g} + {:.12g}", source.z_scale, source.z_offset)
+                            : std::string(),
                   to_string(source.registration)));
+  if (source.options && !source.options->empty()) say("read with", describe_options(*source.options));
   if (source.mosaic) say("joined from", describe_mosaic(*source.mosaic));
   say("reference", describe_crs(source));
   if (const auto place = source_place(metadata)) text += text_from(*place);

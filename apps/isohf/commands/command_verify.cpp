@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -193,11 +194,24 @@ std::unique_ptr<HeightSource> open_as_recorded(const VerifyCommandOptions& optio
     onto.system = system;
   }
   GroundRequest ground;
-  try {
+  const auto open = [&] {
     OpenedInputs opened = open_inputs(files, input.inputs, input.open, options.work);
     const bool lost_a_column = opened.source->info().width == record.width + 1;
     ground.wrap = metadata.wraps_x || lost_a_column ? Wrap::kAlways : Wrap::kNever;
     return laid_out(std::move(opened.source), input.geoid, ground, true);
+  };
+  const auto is_scaled_alike = [&](const HeightSource& source) {
+    return source.info().z_scale == record.z_scale && source.info().z_offset == record.z_offset;
+  };
+  try {
+    std::unique_ptr<HeightSource> source = open();
+    if (!(input.open.z_scale || input.open.z_offset) || is_scaled_alike(*source)) return source;
+    // What export wrote states the scale with these options in it.
+    input.open.z_scale.reset();
+    input.open.z_offset.reset();
+    std::unique_ptr<HeightSource> exported = open();
+    if (is_scaled_alike(*exported)) return exported;
+    return source;
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kInvalidArgument || input.open.reference_system.empty()) throw;
     throw error.within(options.archive + ": was made with --crs");

@@ -90,7 +90,7 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
   line.option(
       "--fill-distance", "D", "Fill voids as far as D samples, 1 to 4096 (default 100); implies --fill",
       [&](const std::string& text) { options.voids.fill_distance = parse_whole_number(text, 1, kMaxFillDistance); });
-  line.option("--z-scale", "FACTOR", "Multiply raw values by FACTOR, then add --z-offset (default: the file's, else 1)",
+  line.option("--z-scale", "FACTOR", "Multiply the file's elevations by FACTOR, then add --z-offset (default 1)",
               [&](const std::string& text) {
                 const double scale = parse_number(text);
                 if (std::abs(scale) < 1e-20 || std::abs(scale) > 1e20) {
@@ -99,7 +99,7 @@ void add_source_options(CommandLine& line, OpenOptions& options) {
                 }
                 options.z_scale = scale;
               });
-  line.option("--z-offset", "NUMBER", "Add NUMBER to scaled values (default: the file's, else 0)",
+  line.option("--z-offset", "NUMBER", "Add NUMBER to the elevations, after --z-scale (default 0)",
               [&](const std::string& text) { options.z_offset = parse_number_in(text, -1e20, 1e20); });
   add_raw_option(line, options);
   line.option("--sample-spacing", "METRES",

@@ -156,7 +156,7 @@ struct OpenOptions {
   std::string part;                          ///< of a file of several parts: name or zero-based number
   std::optional<Registration> registration;  ///< overrides the file's
   std::vector<double> void_values;           ///< override the file's; empty: the file's
-  std::optional<double> z_scale;             ///< elevation = raw * z_scale + z_offset; overrides the file's
+  std::optional<double> z_scale;             ///< elevation = the file's own * z_scale + z_offset
   std::optional<double> z_offset;
   std::optional<double> spacing;  ///< sample spacing in metres, for files that do not say; overrides
   /// "EPSG:2154", WKT, a PROJ string: completes what the file says of its system. Understood by the PROJ module.

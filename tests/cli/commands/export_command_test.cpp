@@ -25,10 +25,11 @@ const std::string kCoast = ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif";
 
 /// The numbers as stored, whatever the file beside them says that they mean.
 Raster read_codes(const std::string& path) {
-  OpenOptions options;
-  options.z_scale = 1.0;
-  options.z_offset = 0.0;
-  return read_raster(path, options);
+  Raster raster = read_raster(path);
+  raster.info.z_scale = 1.0;
+  raster.info.z_offset = 0.0;
+  heights_from_samples(raster.info, 0.0, raster.raw, raster.elevations);
+  return raster;
 }
 
 class ExportCommand : public ::testing::Test {

@@ -102,8 +102,8 @@ TEST_F(RasterDescription, OfRowsInAnotherOrderIsRefused) {
 TEST_F(RasterDescription, IsOverruledByTheUser) {
   write_picture(path);
   OpenOptions options;
-  options.z_scale = 1.0;
-  options.z_offset = 0.0;
+  options.z_scale = 4.0;
+  options.z_offset = 1600.0;
   options.void_values = {100.0};
   options.registration = Registration::kArea;
   const auto source = open_raster(path, options);

@@ -151,7 +151,8 @@ TEST_F(TiffSource, TakesVoidsAndScaleFromGdalTags) {
   OpenOptions options;
   options.z_scale = 3.0;
   options.void_values = {5.0};
-  EXPECT_EQ(info_of(tiff, options).z_scale, 3.0);
+  EXPECT_EQ(info_of(tiff, options).z_scale, 1.5);
+  EXPECT_EQ(info_of(tiff, options).z_offset, 5212200);
   EXPECT_EQ(info_of(tiff, options).void_values, Values{5});
 }
 
