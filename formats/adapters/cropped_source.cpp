@@ -6,11 +6,14 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <utility>
 #include <vector>
 
 #include "formats/adapters/windowed_source.h"
+#include "formats/georeference/reference_system.h"
 #include "isohf/error.h"
+#include "isohf/projection/other_reading.h"
 
 namespace isohf {
 namespace {
@@ -48,8 +51,34 @@ struct Part {
   std::int64_t again = 0;
 };
 
+std::string text_of(const MapBounds& box) {
+  return fmt::format("{:.10g},{:.10g},{:.10g},{:.10g}", box.west, box.south, box.east, box.north);
+}
+
 std::string text_of(const BoundingBox& box) {
   return fmt::format("`bbox` {},{},{},{}", box.west, box.south, box.east, box.north);
+}
+
+/// What else a box that names no ground of a raster may be; empty, or what a sentence ends with.
+std::string other_box(const BoundingBox& box, const Georeference& place, const MapBounds& covered) {
+  std::vector<PairReading> readings = {own_reading(covered, place.unit == HorizontalUnit::kDegree)};
+  const auto take = [&](GeoPoint middle, const std::function<MapPoint(GeoPoint)>& in_own) {
+    readings.push_back(geographic_reading(in_own));
+    if (place.system.body == "Earth" && std::isfinite(middle.latitude)) readings.push_back(utm_reading(middle, in_own));
+  };
+  if (place.unit == HorizontalUnit::kDegree) {
+    take({covered.middle().easting, covered.middle().northing}, [](GeoPoint at) {
+      return MapPoint{at.longitude, at.latitude};
+    });
+  } else if (const std::string system = system_text(place.system); !system.empty()) {
+    try {
+      const auto map = understand_map(system, place.metres_per_unit);
+      take(map->geo_from_map(covered.middle()), [map](GeoPoint at) { return map->map_from_geo(at); });
+    } catch (const Error&) {  // then the box may still be swapped
+    }
+  }
+  const auto other = other_reading({box.west, box.south, box.east, box.north}, covered, readings);
+  return other ? fmt::format("; read as {} it is `bbox` {}", other->words, text_of(other->bounds)) : std::string();
 }
 
 /// Where the columns of a box lie: at both ends of a raster of a whole turn they are one piece.
@@ -107,13 +136,12 @@ Part part_in(const BoundingBox& box, const SourceInfo& info) {
   Part part;
   find_columns(box, info, reach, part);
   if (part.window.columns + part.again < 2 || rows.last <= rows.first) {
-    refuse(fmt::format(
-        "{}: fewer than 2x2 samples lie in {}; its own ground is {:.10g},{:.10g},{:.10g},{:.10g} (West, South, East, "
-        "North)",
-        info.path, text_of(box), place.origin_x - reach * place.spacing_x,
-        place.origin_y - (static_cast<double>(info.height - 1) + reach) * place.spacing_y,
-        place.origin_x + (static_cast<double>(info.width - 1) + reach) * place.spacing_x,
-        place.origin_y + reach * place.spacing_y));
+    const MapBounds covered{place.origin_x - reach * place.spacing_x,
+                            place.origin_y - (static_cast<double>(info.height - 1) + reach) * place.spacing_y,
+                            place.origin_x + (static_cast<double>(info.width - 1) + reach) * place.spacing_x,
+                            place.origin_y + reach * place.spacing_y};
+    refuse(fmt::format("{}: fewer than 2x2 samples lie in {}; its own ground is {} in {}{}", info.path, text_of(box),
+                       text_of(covered), name_of(place), other_box(box, place, covered)));
   }
   part.window.row = rows.first;
   part.window.rows = rows.last - rows.first + 1;

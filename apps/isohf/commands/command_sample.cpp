@@ -4,15 +4,20 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "commands/command.h"
 #include "commands/line_reader.h"
 #include "input/quantities.h"
 #include "isohf/archive.h"
 #include "isohf/error.h"
+#include "isohf/projection/other_reading.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
 #include "options/option_values.h"
@@ -188,6 +193,73 @@ std::string line_of(const SurfaceSample& sample, const SunSample* sun, WorldPoin
   return json_line(json);
 }
 
+/// The kinds of numbers that name places.
+enum class PlaceKind : std::uint8_t { kWorld, kSource, kGeo };
+
+/// Recognises places that lie outside because their numbers are swapped, or of another kind.
+class PlaceHints {
+ public:
+  PlaceHints(const Metadata& metadata, std::string archive, PlaceKind asked)
+      : covered_{metadata.valid.x0, metadata.valid.z0, metadata.valid.x1, metadata.valid.z1},
+        archive_(std::move(archive)),
+        asked_(asked) {}
+
+  /// Looks at a place as it was typed; `world` is where that lies.
+  void look_at(MapPoint typed, WorldPoint world) {
+    const bool is_inside =
+        world.x >= covered_.west && world.x <= covered_.east && world.z >= covered_.south && world.z <= covered_.north;
+    if (is_inside || !hint_.empty() || looked_at_ == kMostLookedAt) return;
+    if (looked_at_++ == 0) prepare();
+    const MapBounds place{typed.easting, typed.northing, typed.easting, typed.northing};
+    const auto other = other_reading(place, covered_, readings_);
+    if (!other) return;
+    constexpr const char* kOptions[] = {"--at", "--at-crs", "--at-lonlat"};
+    const char* const option = kOptions[static_cast<std::size_t>(kinds_[other->index])];
+    hint_ = fmt::format("{:.10g} {:.10g} lies outside; read as {} it lies inside: {} {:.10g} {:.10g}", typed.easting,
+                        typed.northing, other->words, option, other->is_swapped ? typed.northing : typed.easting,
+                        other->is_swapped ? typed.easting : typed.northing);
+  }
+  /// Of the first place that was recognised; empty where none was.
+  [[nodiscard]] const std::string& hint() const { return hint_; }
+
+ private:
+  static constexpr int kMostLookedAt = 1000;
+
+  /// What is asked for comes first.
+  void add(PlaceKind kind, const PairReading& reading) {
+    readings_.insert(kind == asked_ ? readings_.begin() : readings_.end(), reading);
+    kinds_.insert(kind == asked_ ? kinds_.begin() : kinds_.end(), kind);
+  }
+
+  /// Its own reader: the source's map is understood for hints alone.
+  void prepare() {
+    ArchiveReader archive = open_archive(archive_);
+    try {
+      understand_source(archive);
+    } catch (const Error&) {  // then places may still be swapped
+    }
+    const WorldGeoreference places(archive.metadata());
+    const auto flat = [](WorldPoint at) { return MapPoint{at.x, at.z}; };
+    // Every small number is a place of the world.
+    if (asked_ == PlaceKind::kWorld) add(PlaceKind::kWorld, {"x, z", "z, x", [](MapPoint at) { return at; }});
+    if (places.has_source() && archive.metadata().source.crs_unit != "degree") {
+      add(PlaceKind::kSource, {"easting, northing", "northing, easting",
+                               [places, flat](MapPoint at) { return flat(places.world_from_source(at)); }});
+    }
+    if (places.has_geo()) {
+      add(PlaceKind::kGeo, geographic_reading([places, flat](GeoPoint at) { return flat(places.world_from_geo(at)); }));
+    }
+  }
+
+  MapBounds covered_;  ///< x0, z0, x1, z1
+  std::string archive_;
+  PlaceKind asked_;
+  std::vector<PairReading> readings_;
+  std::vector<PlaceKind> kinds_;
+  std::string hint_;
+  int looked_at_ = 0;
+};
+
 /// Collects places and answers them together, in their order.
 class Answers {
  public:
@@ -243,7 +315,7 @@ class Answers {
 };
 
 /// Every place on standard input: x and z, or longitude and latitude.
-void read_places(Answers& answers, const std::function<WorldPoint(WorldPoint)>& in_world) {
+void read_places(Answers& answers, const std::function<void(MapPoint)>& take) {
   LineReader reader;
   const auto flush = [&] { answers.flush(); };
   WorldPoint place{};
@@ -254,7 +326,7 @@ void read_places(Answers& answers, const std::function<WorldPoint(WorldPoint)>& 
       throw Error(ErrorCode::kCorrupt, fmt::format("standard input, line {}: found '{}', must be 'x z', two numbers",
                                                    reader.line_number(), line->substr(0, 80)));
     }
-    answers.add(in_world(place));
+    take({place.x, place.z});
   }
 }
 
@@ -288,18 +360,26 @@ int run(SampleOptions options) {
   PlaceOutput output;
   if (options.with_degrees || (options.common.json && places.has_geo())) output.geo = &places;
   if (options.with_source || (options.common.json && places.has_source())) output.source = &places;
+  PlaceHints hints(metadata, options.archive,
+                   takes_geo      ? PlaceKind::kGeo
+                   : takes_source ? PlaceKind::kSource
+                                  : PlaceKind::kWorld);
   WorkArena threads(options.threads);
   threads.execute([&] {
     Answers answers(archive, options, output);
-    for (const WorldPoint place : options.places) answers.add(place);
-    for (const GeoPoint place : options.geo_places) answers.add(places.world_from_geo(place));
-    for (const MapPoint place : options.source_places) answers.add(places.world_from_source(place));
+    const auto take = [&](MapPoint typed) {
+      const WorldPoint place = takes_geo      ? places.world_from_geo({typed.easting, typed.northing})
+                               : takes_source ? places.world_from_source(typed)
+                                              : WorldPoint{typed.easting, typed.northing};
+      hints.look_at(typed, place);
+      answers.add(place);
+    };
+    for (const WorldPoint place : options.places) take({place.x, place.z});
+    for (const GeoPoint place : options.geo_places) take({place.longitude, place.latitude});
+    for (const MapPoint place : options.source_places) take(place);
     if (options.places.empty() && options.geo_places.empty() && options.source_places.empty()) {
       try {
-        read_places(answers, [&](WorldPoint place) {
-          if (takes_geo) return places.world_from_geo({place.x, place.z});
-          return takes_source ? places.world_from_source({place.x, place.z}) : place;
-        });
+        read_places(answers, take);
       } catch (const Error&) {
         answers.flush();  // what came before a bad place is answered
         throw;
@@ -307,6 +387,7 @@ int run(SampleOptions options) {
     }
     answers.flush();
   });
+  if (!hints.hint().empty()) print_warning(archive.path() + ": " + hints.hint());
   return kExitDone;
 }
 
