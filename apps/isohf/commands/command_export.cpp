@@ -39,25 +39,29 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kExportFooter =
-    R"(Without options, or with --like, OUTPUT has the source's sample type and scale, as far as its format holds them.
-An archive made with --lossless gives the source's samples bit for bit, and their SHA-256 is checked.
-With any other grid, --method, --z-scale or --z-offset the samples are elevations of the surface: float32 in .tif, .exr,
-.flt, .asc, .r32 and .npy, int16 in .hgt, and in .png, .r16 and .raw uint16 over the range of elevations, with scale and
-offset in OUTPUT.json. All tiles share one scale.
+    R"(Without options OUTPUT has the source's grid, reference system, sample type and scale, as far as its format
+holds them, whatever the archive was projected to. An archive made with --lossless gives the source's samples bit for
+bit, and their SHA-256 is checked. --like and --bbox keep the source's type and scale too. With any other grid,
+--method, --z-scale or --z-offset the samples are elevations of the surface: float32 in .tif, .exr, .flt, .asc, .r32
+and .npy, int16 in .hgt, and in .png, .r16 and .raw uint16 over the range of elevations, with scale and offset in
+OUTPUT.json. All tiles share one scale.
 With --tile-size OUTPUT is cut: NAME_x0_y0.r16 is the North-West tile, x counts East, y South. Without --size the
 size becomes the nearest one that makes whole tiles.
 Methods: hex, quintic B-splines along the lattice rows and then down the columns, is nearest to the source;
-barycentric is what a renderer shows; average is the mean over the area of each sample. Samples far apart
-are points on a coarse plane, unless a method is asked for.
+barycentric is what a renderer shows; average is the mean over the area of each sample. Samples 1.5 times as far apart
+as the source's, or farther, are means; rows that are not rows of the archive's map are barycentric.
 
 Examples:
   isohf export dem.isohf back.tif
   isohf export dem.isohf beside.tif --like other.tif
   isohf export dem.isohf dem.tif --spacing 30
+  isohf export dem.isohf map.tif --to-crs none
   isohf export dem.isohf alps.png --size 4097x4097
   isohf export dem.isohf part.tif --bbox 6.5,45,7,45.5
   isohf export dem.isohf unreal.r16 --tile-size 1009 --overlap 1)";
 
+/// In --to-crs: the map that an archive lies on, as it is stored.
+constexpr const char* kOwnMap = "none";
 /// Samples on a side, at most.
 constexpr std::int64_t kMostSide = std::int64_t{1} << 31U;
 
@@ -70,7 +74,7 @@ struct ExportOptions {
   std::string like;
   std::optional<GridSize> size;
   std::optional<LengthValue> spacing;
-  std::string system;  ///< a reference system; empty: the archive's own
+  std::string system;  ///< a reference system, or "none"; empty: the source's
   std::optional<BoundingBox> bbox;
   std::optional<RestoreMethod> given_method;
   std::optional<GridSize> tile_size;
@@ -83,14 +87,20 @@ struct ExportOptions {
   [[nodiscard]] RestoreMethod method(const Metadata& metadata, const SampleGrid& grid) const {
     return given_method.value_or(usual_method(metadata, grid));
   }
-  /// Whether the samples have the source's type and scale.
-  [[nodiscard]] bool as_source() const { return !z_scale && !z_offset && (!like.empty() || is_on_sources_grid()); }
+  [[nodiscard]] bool has_system() const { return !system.empty() && system != kOwnMap; }
+  /// Whether the samples have the source's type and scale: its own all, and of a part those that the format holds.
+  [[nodiscard]] bool as_source(const Metadata& metadata) const {
+    if (z_scale || z_offset) return false;
+    const SampleType source = sample_type_from_string(metadata.source.sample_type);
+    return !like.empty() || (is_on_sources_grid() && (!bbox || restored_type(output, source) == source));
+  }
+  /// All of it, or a part.
   [[nodiscard]] bool is_on_sources_grid() const {
-    return like.empty() && !size && !spacing && system.empty() && !bbox && !given_method && !tile_size;
+    return like.empty() && !size && !spacing && system.empty() && !given_method && !tile_size;
   }
   [[nodiscard]] SampleType written_type(const Metadata& metadata) const {
     return type.value_or(restored_type(
-        output, as_source() ? sample_type_from_string(metadata.source.sample_type) : SampleType::kFloat32));
+        output, as_source(metadata) ? sample_type_from_string(metadata.source.sample_type) : SampleType::kFloat32));
   }
 };
 
@@ -119,19 +129,19 @@ std::optional<ExportOptions> parse_export(const Arguments& arguments) {
   line.group("Grid");
   line.option("--like", "INPUT", "The grid of this raster, or of a folder, \"pattern*\" or @list of them",
               options.like);
-  line.option("--size", "WxH", "Write so many samples over the ground (default: the source's samples)",
+  line.option("--size", "WxH", "Write so many samples over the source's ground (default: the source's samples)",
               [&](const std::string& text) { options.size = parse_size(text, 1, kMostSide); });
   line.option("--spacing", "LENGTH", "Write samples so far apart: world units, or with a unit as in 30m, 0.5km, 100ft",
               [&](const std::string& text) { options.spacing = parse_length(text); });
   line.option("--to-crs", "SYSTEM",
-              "Write the raster in this reference system, each sample by its place: EPSG:2154, WKT, a PROJ string, or "
-              "a file with one of them (default: the archive's)",
-              [&](const std::string& text) { options.system = system_from(text); });
+              "Write the raster in this reference system: EPSG:2154, WKT, a PROJ string, a file with one of them, or "
+              "none for the archive's own map (default: the source's)",
+              [&](const std::string& text) { options.system = text == kOwnMap ? text : system_from(text); });
   line.option("--bbox", "W,S,E,N",
               "Only this part of the ground, in the source's coordinates; across the 180th meridian W is above E",
               [&](const std::string& text) { options.bbox = bounding_box_from_string(text); });
   line.option("--method", "NAME",
-              "hex, barycentric or average (default hex; the source's own samples where they are kept)",
+              "hex, barycentric or average (default: see below; the source's own samples if they are kept)",
               [&](const std::string& text) { options.given_method = restore_method_from_string(text); });
   line.words({"hex", "barycentric", "average"});
   line.group("Tiles");
@@ -205,17 +215,12 @@ SampleGrid grid_of_other(const ExportOptions& options, const Metadata& metadata)
             frame.spacing_x,
             frame.spacing_z};
   }
-  if (grid->in_degrees && options.given_method == RestoreMethod::kHex) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: its rows are no rows of the archive, whose input was projected ({}), and --method hex "
-                            "goes along rows; leave it out, or give --method barycentric",
-                            options.like, describe_projection(metadata.projection->spec)));
-  }
   return *grid;
 }
 
 /// The grid in --to-crs over a part of the world, which --bbox gives if it is there; warnings are printed.
-/// Throws Error{kInvalidArgument} for a system that is not understood, --method hex, and a spacing in metres where coordinates are degrees.
+/// Throws Error{kInvalidArgument} for a system that is not understood, and a spacing in metres where coordinates are
+/// degrees.
 SampleGrid asked_grid_in_system(const ExportOptions& options, ArchiveReader& archive, const WorldBounds& ground,
                                 const std::optional<MapBounds>& box, bool quiet) {
   std::vector<Warning> warnings;
@@ -232,20 +237,11 @@ SampleGrid asked_grid_in_system(const ExportOptions& options, ArchiveReader& arc
     }
     spacing = options.spacing->in_metres ? options.spacing->value / place.metres_per_unit : options.spacing->value;
   }
+  const Metadata& metadata = archive.metadata();
   try {
-    std::optional<SampleGrid> own;
-    if (box && !options.size && !spacing && is_warped(archive.metadata())) {
-      own = own_grid_in_box(archive.metadata(), *system, *box);
-      if (own) own->system = system;
-    }
-    const SampleGrid grid =
-        own ? *own : grid_in_system(archive.metadata(), ground, std::move(system), options.size, spacing);
-    if (grid.goes_by_places() && options.given_method == RestoreMethod::kHex) {
-      throw Error(
-          ErrorCode::kInvalidArgument,
-          "--to-crs: rows of another reference system are no rows of the archive, along which --method hex goes; "
-          "leave it out, or give --method barycentric");
-    }
+    const SampleGrid grid = is_warped(metadata) && is_source_system(metadata, *system)
+                                ? grid_of_source(metadata, {box, options.size, spacing, false})
+                                : grid_in_system(metadata, ground, std::move(system), options.size, spacing);
     if (grid.width <= kMostSide && grid.height <= kMostSide) return grid;
     throw Error(ErrorCode::kInvalidArgument, fmt::format("--spacing makes {} x {} samples, at most {} a side are "
                                                          "possible",
@@ -280,41 +276,55 @@ struct ExportGrid {
   TileCut cut;
 };
 
-ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
+/// The grid of a projected archive in its source's reference system.
+SampleGrid grid_by_source(const ExportOptions& options, ArchiveReader& archive, const std::optional<MapBounds>& box,
+                          const std::optional<double>& spacing) {
+  try {
+    understand_source(archive);
+  } catch (const Error& error) {
+    throw Error(error.code(), std::string(error.what()) + "; --to-crs none writes the archive's own map");
+  }
+  try {
+    return grid_of_source(archive.metadata(), {box, options.size, spacing, true});
+  } catch (const Error& error) {
+    throw error.within(box ? fmt::format("--bbox {},{},{},{}", box->west, box->south, box->east, box->north)
+                           : options.archive);
+  }
+}
+
+/// Without tiles; warnings are printed unless it is `quiet`.
+SampleGrid asked_samples(const ExportOptions& options, ArchiveReader& archive, bool quiet) {
   const Metadata& metadata = archive.metadata();
-  const WorldBounds ground = options.bbox ? ground_in_box(archive, *options.bbox, AcrossEnds::kGoesOn) : metadata.valid;
-  const bool area = samples_are_areas(metadata);
+  if (!options.like.empty()) return grid_of_other(options, metadata);
   const auto& asked = options.bbox;
   const auto box =
       asked ? std::optional(MapBounds{asked->west, asked->south, asked->east, asked->north}) : std::nullopt;
+  if (is_warped(metadata) && options.system.empty())
+    return grid_by_source(options, archive, box, spacing_in_world(options, metadata));
+  const WorldBounds ground = asked ? ground_in_box(archive, *asked, AcrossEnds::kGoesOn) : metadata.valid;
+  if (options.has_system()) return asked_grid_in_system(options, archive, ground, box, quiet);
+  if (options.size || options.spacing)
+    return grid_over(ground, samples_are_areas(metadata), options.size, spacing_in_world(options, metadata));
+  const SampleGrid all = natural_grid(metadata);
+  if (!asked) return all;
+  if (const std::optional<SampleGrid> part = part_of(all, ground)) return *part;
+  throw Error(ErrorCode::kInvalidArgument, "--bbox holds no sample of the source's grid; --size or --spacing would");
+}
+
+ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
   ExportGrid grid;
-  if (!options.like.empty()) {
-    grid.samples = grid_of_other(options, metadata);
-  } else if (!options.system.empty()) {
-    grid.samples = asked_grid_in_system(options, archive, ground, box, false);
-  } else if (options.size || options.spacing) {
-    grid.samples = grid_over(ground, area, options.size, spacing_in_world(options, metadata));
-  } else {
-    grid.samples = natural_grid(metadata);
-    if (options.bbox) {
-      const std::optional<SampleGrid> part = part_of(grid.samples, ground);
-      if (!part) {
-        throw Error(ErrorCode::kInvalidArgument,
-                    "--bbox holds no sample of the source's grid; --size or --spacing would");
-      }
-      grid.samples = *part;
-    }
-  }
+  grid.samples = asked_samples(options, archive, false);
   GridSize size{grid.samples.width, grid.samples.height};
   grid.cut = cut_into_tiles(size, !options.size && !options.spacing, options.tile_size, options.overlap);
   if (size != GridSize{grid.samples.width, grid.samples.height}) {
-    if (grid.samples.system) {
-      ExportOptions sized = options;
-      sized.size = size;
-      grid.samples = asked_grid_in_system(sized, archive, ground, box, true);
-      return grid;
-    }
-    grid.samples = grid_over(ground, area, size, std::nullopt);
+    ExportOptions sized = options;
+    sized.size = size;
+    grid.samples = asked_samples(sized, archive, true);
+  }
+  if (grid.samples.goes_by_places() && options.given_method == RestoreMethod::kHex) {
+    throw Error(ErrorCode::kInvalidArgument,
+                "--method hex goes along rows of the archive's map, and those of OUTPUT are others; leave it out, give "
+                "--method barycentric, or --to-crs none");
   }
   return grid;
 }
@@ -358,7 +368,7 @@ class Exporter {
       part.height = grid_.cut.rows;
       part.first_x += static_cast<double>(column * (grid_.cut.columns - grid_.cut.overlap)) * part.spacing_x;
       const double south = static_cast<double>(row * (grid_.cut.rows - grid_.cut.overlap)) * part.spacing_z;
-      part.first_z += part.system ? -south : south;  // northings, and world z
+      part.first_z += part.goes_by_places() ? -south : south;  // northings, and world z
       RasterSpec spec = raster_spec(archive_.metadata(), part, mapping, void_value);
       if (says_place() && !(spec.georeference && spec.georeference->has_origin)) {
         // Of no known place, it lies where it does from the archive's North-West corner on.
@@ -399,7 +409,7 @@ class Exporter {
   [[nodiscard]] bool says_place() const {
     const RasterKind kind = raster_kind(options_.output);
     return grid_.cut.asked || options_.bbox ||
-           (!options_.as_source() && (kind == RasterKind::kAsc || kind == RasterKind::kFlt));
+           (!options_.as_source(archive_.metadata()) && (kind == RasterKind::kAsc || kind == RasterKind::kFlt));
   }
   Job job(const char* stage) {
     Job made = job_from(options_.work, display_);
@@ -437,7 +447,7 @@ class Exporter {
   }
 
   SampleMapping choose_mapping() {
-    if (options_.as_source()) return source_mapping();
+    if (options_.as_source(archive_.metadata())) return source_mapping();
     const SampleType type = options_.written_type(archive_.metadata());
     if (options_.z_scale || options_.z_offset) {
       return {type, options_.z_scale.value_or(1.0), options_.z_offset.value_or(0.0)};
@@ -457,8 +467,8 @@ class Exporter {
   /// All samples of the source are of its type: what lies beyond its ends is overshoot.
   [[nodiscard]] SampleStore::Clamp clamp() const {
     if (options_.clamp_range) return SampleStore::Clamp::kAll;
-    const bool is_source_type =
-        options_.as_source() && mapping.type == sample_type_from_string(archive_.metadata().source.sample_type);
+    const bool is_source_type = options_.as_source(archive_.metadata()) &&
+                                mapping.type == sample_type_from_string(archive_.metadata().source.sample_type);
     return is_source_type ? SampleStore::Clamp::kAtFreeEnds : SampleStore::Clamp::kNone;
   }
 
@@ -475,7 +485,8 @@ int run(const ExportOptions& options) {
   }
   ArchiveReader archive = open_with_source(options.archive);
   const Metadata& metadata = archive.metadata();
-  const bool is_lossless = options.as_source() && options.like.empty() && lossless_record(metadata);
+  const bool is_lossless =
+      options.is_on_sources_grid() && !options.bbox && options.as_source(metadata) && lossless_record(metadata);
   ExportGrid grid;
   if (is_lossless) {
     const SampleGrid source = source_grid(metadata.source);

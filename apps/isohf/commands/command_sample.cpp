@@ -360,7 +360,7 @@ int run(SampleOptions options) {
   PlaceOutput output;
   if (options.with_degrees || (options.common.json && places.has_geo())) output.geo = &places;
   if (options.with_source || (options.common.json && places.has_source())) output.source = &places;
-  PlaceHints hints(metadata, options.archive,
+  PlaceHints hints(archive.metadata(), options.archive,
                    takes_geo      ? PlaceKind::kGeo
                    : takes_source ? PlaceKind::kSource
                                   : PlaceKind::kWorld);

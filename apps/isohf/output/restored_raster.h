@@ -56,8 +56,7 @@ struct RasterTarget {
   std::string remedy;
 };
 /// Said of rasters by RestoreMethod::kPlane.
-inline constexpr const char* kOnAPlane =
-    ", on a coarse plane's triangles (of all tiles: --method barycentric, means: --method average)";
+inline constexpr const char* kOnAPlane = ", means on a coarse plane (of all tiles: --method average)";
 
 /// What helps whatever the command: --clamp-range, another --method than hex, another format; and how far elevations go,
 /// where it is not for an overshoot that the type does not hold them.

@@ -140,7 +140,7 @@ class Surface {
 enum class RestoreMethod {
   kBarycentric,  ///< on the triangles, as the renderer draws them
   kHex,          ///< by quintic B-splines along the rows and then down the columns; on the triangles beside nodata
-  kPlane,        ///< on the triangles of a coarse plane: blends of vertices within an eighth of a sample's spacing
+  kPlane,        ///< as kAverage, on the triangles of a coarse plane
   kAverage,  ///< the mean over the area that a sample stands for: of places on the triangles in its middle and around
              ///< it, no farther apart than vertices; those without an elevation do not count
 };
@@ -196,8 +196,10 @@ using GridSize = std::pair<std::int64_t, std::int64_t>;
 /// True where the surface may have no elevation at a sample of the grid.
 [[nodiscard]] bool may_have_nodata(const Metadata& metadata, const SampleGrid& grid);
 
-/// How a grid is read where nobody says: by kPlane where the archive has a coarse plane with eight vertices or more between
-/// samples, either way, so that its tiles suffice; else by kHex, in degrees by kBarycentric.
+/// How a grid is read where nobody says. Samples 1.5 times as far apart as the source's or farther, along either axis,
+/// are means: by kPlane if the archive has a coarse plane with 32 vertices or more between samples along both axes, so
+/// that its tiles suffice; else by kAverage. Others are points, by kHex, and by kBarycentric where the grid goes by
+/// places.
 [[nodiscard]] RestoreMethod usual_method(const Metadata& metadata, const SampleGrid& grid);
 
 /// True where the archive's source was projected, so that its rows are no rows of the world.
@@ -214,8 +216,8 @@ using GridSize = std::pair<std::int64_t, std::int64_t>;
 /// file. The bits depend on archive and grid alone.
 class RowReader {
  public:
-  /// A grid in degrees is read on the triangles, each sample at its own longitude and latitude. kPlane reads the tiles of
-  /// the coarsest plane that suffices, and no other; it is for grids of which usual_method() says so. The archive must
+  /// A grid that goes by places is read on the triangles, each sample at its own. kPlane reads the tiles of the
+  /// coarsest plane that suffices, and no other; it is for grids of which usual_method() says so. The archive must
   /// outlive the reader. Throws Error{kInvalidArgument} for a grid without samples or far beyond the surface, and for one in
   /// degrees where the archive's are not known; kOutOfMemory where job.memory_bytes are too few for read_all().
   RowReader(const ArchiveReader& archive, const SampleGrid& grid, RestoreMethod method = RestoreMethod::kHex,

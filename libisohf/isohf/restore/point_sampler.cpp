@@ -126,10 +126,11 @@ void for_each_tile(const ReadTile& read_tile, TileIndex first, std::int64_t tile
 }
 
 PointSampler::PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile,
-                           std::uint64_t memory_bytes, const GroundScale& scale)
+                           std::uint64_t memory_bytes, const GroundScale& scale, const std::optional<TileGrid>& world)
     : grid_(grid),
       grid_m_(scaled(grid, scale)),
       metres_(scale.elevation),
+      end_{world.value_or(grid).world_width(), world.value_or(grid).world_height()},
       quantisation_(quantisation),
       read_tile_(std::move(read_tile)) {
   const std::uint64_t bytes = quantisation.type == CodeType::kF32 ? 4 : 2;
@@ -191,8 +192,8 @@ void PointSampler::visit(std::size_t points, const TileOf& tile_of, const Sample
 std::int64_t PointSampler::tile_under(WorldPoint point) const {
   // A place on the outline that went through degrees or a map, or was rounded, comes back off it.
   const double slack = 0.001 * std::min(2.0 * grid_.sigma_x(), grid_.sigma_z());
-  const bool is_inside = std::abs(std::clamp(point.x, 0.0, grid_.world_width()) - point.x) <= slack &&
-                         std::abs(std::clamp(point.z, 0.0, grid_.world_height()) - point.z) <= slack;
+  const bool is_inside = std::abs(std::clamp(point.x, 0.0, end_.x) - point.x) <= slack &&
+                         std::abs(std::clamp(point.z, 0.0, end_.z) - point.z) <= slack;
   return is_inside ? grid_.flat_index(grid_.locate(point).tile) : -1;
 }
 

@@ -37,8 +37,9 @@ class PointSampler {
  public:
   /// Keeps at most `memory_bytes` of decoded tiles, and has as much again in hand during a call; one tile in each
   /// thread at least. Normals are those of heights and lengths in metres, by `scale`.
+  /// world  where the surface ends; nullopt: with the grid, beyond which a coarse plane may reach
   PointSampler(const TileGrid& grid, const Quantisation& quantisation, ReadTile read_tile, std::uint64_t memory_bytes,
-               const GroundScale& scale = {});
+               const GroundScale& scale = {}, const std::optional<TileGrid>& world = {});
 
   void sample(std::span<const WorldPoint> points, std::span<SurfaceSample> samples);
   void sample(std::span<const WorldPoint> points, std::span<double> elevations);
@@ -64,6 +65,7 @@ class PointSampler {
   TileGrid grid_;
   TileGrid grid_m_;  ///< whose lengths are metres
   double metres_;    ///< in one elevation unit
+  WorldPoint end_;
   Quantisation quantisation_;
   ReadTile read_tile_;
   std::size_t capacity_;  ///< tiles to keep

@@ -74,17 +74,14 @@ std::optional<double> once_round(const Metadata& metadata) {
   return static_cast<double>(source.width) * source.crs_spacing_x;
 }
 
-/// The box by as many whole turns East that it lies on the archive's ground.
-MapBounds turned(const MapBounds& box, const Metadata& metadata, double turn, AcrossEnds across) {
-  const SourceColumns columns(metadata.source);
-  const double west = columns.coordinate(metadata.valid.x0);
-  const double east = columns.coordinate(metadata.valid.x1);
+/// The box by as many whole turns East that it lies on the archive's ground, which reaches from `west` to `east`.
+MapBounds turned(const MapBounds& box, double west, double east, const SourceRecord& source, double turn,
+                 AcrossEnds across) {
   const auto by = [&](double turns) {
     return MapBounds{box.west + turns * turn, box.south, box.east + turns * turn, box.north};
   };
   // Less than this holds no sample: half of an area, or but the rounding of a post's coordinate.
-  const double least =
-      metadata.source.crs_spacing_x * (metadata.source.registration == Registration::kArea ? 0.5 : 1e-6);
+  const double least = source.crs_spacing_x * (source.registration == Registration::kArea ? 0.5 : 1e-6);
   const double first = std::ceil((west + least - box.east) / turn);
   const double last = std::floor((east - least - box.west) / turn);
   if (first > last) return by(std::round((west + east - box.west - box.east) / (2.0 * turn)));
@@ -100,6 +97,32 @@ MapBounds turned(const MapBounds& box, const Metadata& metadata, double turn, Ac
       fmt::format("lies at the East end and at the West end of the archive's ground, {:.10g} to {:.10g}, which is "
                   "no rectangle of it; give {:.10g} to {:.10g} and {:.10g} to {:.10g} one after the other",
                   west, east, again.west, east, west, there.east));
+}
+
+/// Longitudes and latitudes as a map of their own.
+class DegreeMap final : public ReferenceMap {
+ public:
+  explicit DegreeMap(const Ellipsoid& ellipsoid) : ellipsoid_(ellipsoid) {}
+
+  [[nodiscard]] GeoPoint geo_from_map(MapPoint place) const override {
+    return {std::remainder(place.easting, kTurn), place.northing};
+  }
+  [[nodiscard]] MapPoint map_from_geo(GeoPoint place) const override { return {place.longitude, place.latitude}; }
+  [[nodiscard]] double metres_per_unit() const override { return 1.0; }
+  [[nodiscard]] const Ellipsoid& ellipsoid() const override { return ellipsoid_; }
+
+ private:
+  Ellipsoid ellipsoid_;
+};
+
+/// That of a projected source. Throws Error{kInvalidArgument} where it is a map that is not understood.
+std::shared_ptr<const GridSystem> system_of_source(const Metadata& metadata) {
+  const Georeference place = source_georeference(metadata.source);
+  if (place.unit == HorizontalUnit::kDegree)
+    return std::make_shared<GridSystem>(
+        GridSystem{std::make_shared<DegreeMap>(metadata.projection->spec.ellipsoid), place});
+  if (metadata.source.map) return std::make_shared<GridSystem>(GridSystem{metadata.source.map, place});
+  refuse(fmt::format("the reference system of its source, {}, is not understood", describe_system(place.system)));
 }
 
 /// Refuses coordinates that are known to mean another ground than the source's.
@@ -126,7 +149,7 @@ void check_same_system(const Metadata& metadata, const SourceInfo& other) {
   const bool same_ellipsoid = !their_axis || !ours || std::abs(*their_axis - *ours) <= kSameEllipsoid * *ours;
   bool same = same_ellipsoid;
   if (unit == HorizontalUnit::kMetre && units_known) {
-    const double metres = source.spacing_x / source.crs_spacing_x;
+    const double metres = source.metres_per_unit;
     same = same && std::abs(theirs.metres_per_unit - metres) <= 1e-9 * metres &&
            (!source.crs_epsg || !theirs.system.epsg || source.crs_epsg == theirs.system.epsg);
     const bool by_text = !source.crs_epsg && !theirs.system.epsg && !theirs.system.wkt.empty();
@@ -170,11 +193,21 @@ SampleGrid grid_through_map(const Metadata& metadata, const SourceInfo& other) {
             theirs.spacing_y * metres};
   }
   const std::string map = describe_projection(on.spec);
-  if (source_georeference(metadata.source).unit != HorizontalUnit::kDegree) {
-    refuse(
-        fmt::format("{}: the archive's input was laid on another map; only a raster on that ({}) has a place there; "
-                    "bring it there (gdalwarp)",
-                    other.path, map));
+  const Georeference source = source_georeference(metadata.source);
+  SampleGrid grid{other.width,      other.height, theirs.origin_x, theirs.origin_y, theirs.spacing_x,
+                  theirs.spacing_y, true};
+  if (theirs.registration != Registration::kUnknown) grid.registration = theirs.registration;
+  if (source.unit != HorizontalUnit::kDegree) {
+    if (!theirs.has_origin) {
+      refuse(
+          fmt::format("{}: does not say where it lies; only a raster in the reference system of the archive's "
+                      "input, {}, or on its map ({}) has a place there",
+                      other.path, describe_system(source.system), map));
+    }
+    check_same_system(metadata, other);
+    grid.in_degrees = false;
+    grid.system = system_of_source(metadata);
+    return grid;
   }
   if (!theirs.has_origin || theirs.unit != HorizontalUnit::kDegree) {
     refuse(fmt::format(
@@ -186,9 +219,6 @@ SampleGrid grid_through_map(const Metadata& metadata, const SourceInfo& other) {
         map));
   }
   check_same_system(metadata, other);
-  SampleGrid grid{other.width,      other.height, theirs.origin_x, theirs.origin_y, theirs.spacing_x,
-                  theirs.spacing_y, true};
-  if (theirs.registration != Registration::kUnknown) grid.registration = theirs.registration;
   return grid;
 }
 
@@ -442,39 +472,85 @@ MapBounds turned_onto(const SampleGrid& grid, double half, MapBounds bounds) {
   return bounds;
 }
 
-/// The samples of a source, whose rows `all` counts southwards, that lie between bounds of its coordinates with `half` a
-/// spacing around each; nullopt where there are none.
-std::optional<SampleGrid> source_samples_in(const MapBounds& bounds, const SampleGrid& all, double half,
-                                            Registration registration) {
-  const WorldBounds within{
-      std::max(bounds.west, all.first_x - half * all.spacing_x),
-      std::max(-bounds.north, all.first_z - half * all.spacing_z),
-      std::min(bounds.east, all.first_x + (static_cast<double>(all.width - 1) + half) * all.spacing_x),
-      std::min(-bounds.south, all.first_z + (static_cast<double>(all.height - 1) + half) * all.spacing_z)};
-  auto part = part_of(all, within);
-  if (!part) return std::nullopt;
-  part->first_z = -part->first_z;
-  part->registration = registration;
-  return part;
+/// The rectangle of a projected source's own coordinates around some ground. Of all that the archive has: the source, or
+/// of an extracted part the rectangle around its tiles.
+MapBounds shown_of_source(const Metadata& metadata, const GridSystem& system, const WorldBounds& ground) {
+  const Georeference& place = system.place;
+  const SourceRecord& source = metadata.source;
+  const double half = place.registration == Registration::kArea ? 0.5 : 0.0;
+  const MapBounds all{place.origin_x - half * place.spacing_x,
+                      place.origin_y - (static_cast<double>(source.height - 1) + half) * place.spacing_y,
+                      place.origin_x + (static_cast<double>(source.width - 1) + half) * place.spacing_x,
+                      place.origin_y + half * place.spacing_y};
+  const WorldBounds& whole = metadata.valid;
+  const bool is_whole =
+      ground.x0 == whole.x0 && ground.z0 == whole.z0 && ground.x1 == whole.x1 && ground.z1 == whole.z1;
+  if (is_whole && !is_cut(metadata)) return all;
+  MapBounds shown = ImageFinder(metadata, system).image_of(ground).bounds;
+  if (place.unit == HorizontalUnit::kDegree) {
+    const SampleGrid columns{source.width, 1, place.origin_x, 0.0, place.spacing_x, place.spacing_y};
+    shown = turned_onto(columns, half, shown);
+  }
+  return {std::max(shown.west, all.west), std::max(shown.south, all.south), std::min(shown.east, all.east),
+          std::min(shown.north, all.north)};
+}
+
+/// Samples of `shown`, in the source's system.
+SampleGrid grid_over_source(const Metadata& metadata, const std::shared_ptr<const GridSystem>& system,
+                            const MapBounds& shown, const SourceGridRequest& request) {
+  const Georeference& place = system->place;
+  const SourceRecord& source = metadata.source;
+  // In samples of the source, or in lengths in which a spacing is given.
+  const double unit_x = !request.spacing ? 1.0 : request.in_world_units ? source.spacing_x : place.spacing_x;
+  const double unit_z = !request.spacing ? 1.0 : request.in_world_units ? source.spacing_z : place.spacing_y;
+  const WorldBounds ground{(shown.west - place.origin_x) / place.spacing_x * unit_x,
+                           (place.origin_y - shown.north) / place.spacing_y * unit_z,
+                           (shown.east - place.origin_x) / place.spacing_x * unit_x,
+                           (place.origin_y - shown.south) / place.spacing_y * unit_z};
+  SampleGrid grid{source.width, source.height, 0.0, 0.0, unit_x, unit_z};
+  if (request.size || request.spacing) {
+    grid = grid_over(ground, place.registration == Registration::kArea, request.size, request.spacing);
+  } else if (const auto part = part_of(grid, ground)) {
+    grid = *part;
+  } else {
+    refuse("no sample of the archive's source lies there; give `size` or `spacing`");
+  }
+  grid.first_x = place.origin_x + grid.first_x / unit_x * place.spacing_x;
+  grid.first_z = place.origin_y - grid.first_z / unit_z * place.spacing_y;
+  grid.spacing_x = grid.spacing_x / unit_x * place.spacing_x;
+  grid.spacing_z = grid.spacing_z / unit_z * place.spacing_y;
+  grid.registration = place.registration;
+  grid.in_degrees = place.unit == HorizontalUnit::kDegree;
+  if (!grid.in_degrees) grid.system = system;
+  return grid;
 }
 
 }  // namespace
 
-std::optional<SampleGrid> own_grid_in_box(const Metadata& metadata, const GridSystem& system, const MapBounds& box) {
-  const Georeference& place = system.place;
-  const SourceRecord& source = metadata.source;
-  if (!place.has_origin || source.origin_x != place.origin_x || source.origin_y != place.origin_y) return std::nullopt;
-  SampleGrid all{source.width, source.height, place.origin_x, -place.origin_y, place.spacing_x, place.spacing_y};
-  MapBounds here = box;
-  if (place.unit == HorizontalUnit::kDegree) {
-    if (here.east <= here.west) here.east += kTurn;
-    const double turns = kTurn * std::floor((here.west - all.first_x) / kTurn + 1e-9);
-    here.west -= turns;
-    here.east -= turns;
-    // Columns go on behind the last one where they go round.
-    if (static_cast<double>(all.width) * all.spacing_x >= kTurn - 0.5 * all.spacing_x) all.width *= 2;
+SampleGrid grid_of_source(const Metadata& metadata, const SourceGridRequest& request) {
+  require_spacing(request.spacing);
+  if (request.size) require_size("a grid", request.size->first, request.size->second);
+  const std::shared_ptr<const GridSystem> system = system_of_source(metadata);
+  const Georeference& place = system->place;
+  MapBounds shown = shown_of_source(metadata, *system, metadata.valid);
+  if (request.box) {
+    MapBounds box = *request.box;
+    if (place.unit == HorizontalUnit::kDegree) {
+      if (box.east <= box.west) box.east += kTurn;
+      box = turned(box, shown.west, shown.east, metadata.source, kTurn, AcrossEnds::kGoesOn);
+    }
+    if (!(box.west < box.east)) refuse("West must be less than East");
+    if (!(box.west <= shown.east && box.east >= shown.west && box.south <= shown.north && box.north >= shown.south))
+      refuse("lies outside of what the archive covers");
+    shown = box;
   }
-  return source_samples_in(here, all, 0.0, place.registration);
+  return grid_over_source(metadata, system, shown, request);
+}
+
+bool is_source_system(const Metadata& metadata, const GridSystem& system) {
+  const SourceRecord& source = metadata.source;
+  const Georeference& place = system.place;
+  return place.has_origin && source.origin_x == place.origin_x && source.origin_y == place.origin_y;
 }
 
 SampleGrid grid_in_system(const Metadata& metadata, const WorldBounds& ground, std::shared_ptr<const GridSystem> system,
@@ -490,22 +566,13 @@ SampleGrid grid_in_system(const Metadata& metadata, const WorldBounds& ground, s
     if (const auto part = part_of(natural_grid(metadata), ground)) return *part;
     refuse("no sample of the archive's own grid lies there; give `size` or `spacing`");
   }
-  const ImageFinder finder(metadata, *system);
-  auto [bounds, stretch] = finder.image_of(ground);
-  SampleGrid grid;
-  if (place.has_origin && !size && !spacing) {
-    // The samples of the source that lie on the ground.
-    const SourceRecord& source = metadata.source;
-    const SampleGrid all{source.width,    source.height,   place.origin_x,
-                         -place.origin_y, place.spacing_x, place.spacing_y};
-    const double half = place.registration == Registration::kArea ? 0.5 : 0.0;
-    if (place.unit == HorizontalUnit::kDegree) bounds = turned_onto(all, half, bounds);
-    const auto part = source_samples_in(bounds, all, half, place.registration);
-    if (!part) refuse("no sample of the archive's source lies there; give `size` or `spacing`");
-    grid = *part;
-    grid.system = std::move(system);
-    return grid;
+  if (is_warped(metadata) && is_source_system(metadata, *system)) {
+    const auto own_system = system_of_source(metadata);
+    return grid_over_source(metadata, own_system, shown_of_source(metadata, *own_system, ground),
+                            {{}, size, spacing, false});
   }
+  auto [bounds, stretch] = ImageFinder(metadata, *system).image_of(ground);
+  SampleGrid grid;
   grid.registration = Registration::kArea;
   if (size) {
     grid.width = size->first;
@@ -546,8 +613,18 @@ bool samples_are_areas(const Metadata& metadata) {
   return is_warped(metadata) || metadata.source.registration == Registration::kArea;
 }
 
+bool is_in_source_system(const Metadata& metadata, const SampleGrid& grid) {
+  return grid.in_degrees || (grid.system && is_source_system(metadata, *grid.system));
+}
+
 bool may_have_nodata(const Metadata& metadata, const SampleGrid& grid) {
-  if (grid.goes_by_places()) return true;
+  if (grid.goes_by_places()) {
+    const SourceRecord& source = metadata.source;
+    const bool is_sources = is_in_source_system(metadata, grid) && grid.width == source.width &&
+                            grid.height == source.height && grid.first_x == source.origin_x &&
+                            grid.first_z == source.origin_y && grid.spacing_x == source.crs_spacing_x;
+    return !is_sources || is_cut(metadata) || metadata.statistics.voids > 0 || metadata.outside == Outside::kVoid;
+  }
   const TileGrid& tiles = metadata.grid;
   const auto turn = turn_of(metadata);
   const bool goes_round = turn && turn->ground_x1 - turn->ground_x0 >= turn->length * (1.0 - 1e-9);
@@ -658,8 +735,11 @@ WorldBounds world_bounds(const Metadata& metadata, const MapBounds& asked, Acros
     return {map.west - on.origin.easting, on.origin.northing - map.north, map.east - on.origin.easting,
             on.origin.northing - map.south};
   }
-  if (const auto turn = once_round(metadata)) box = turned(box, metadata, *turn, across);
   const SourceColumns columns(source);
+  if (const auto turn = once_round(metadata)) {
+    const WorldBounds& ground = metadata.valid;
+    box = turned(box, columns.coordinate(ground.x0), columns.coordinate(ground.x1), source, *turn, across);
+  }
   const double to_z = source.spacing_z / source.crs_spacing_y;
   WorldBounds bounds;
   bounds.x0 = columns.world(box.west);

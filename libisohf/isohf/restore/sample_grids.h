@@ -45,14 +45,25 @@ enum class AcrossEnds : std::uint8_t {
 /// and `across` lets the box go on.
 [[nodiscard]] WorldBounds world_bounds(const Metadata& metadata, const MapBounds& box, AcrossEnds across);
 
-/// The samples of the source itself in a box of its own system, where `system` is that and knows its grid; longitudes as
-/// it counts them. nullopt where there are none.
-[[nodiscard]] std::optional<SampleGrid> own_grid_in_box(const Metadata& metadata, const GridSystem& system,
-                                                        const MapBounds& box);
+/// What is asked for in the reference system of an archive's source; without anything the source's own samples.
+struct SourceGridRequest {
+  std::optional<MapBounds> box;  ///< its coordinates; as world_bounds() takes it
+  std::optional<GridSize> size;
+  std::optional<double> spacing;
+  bool in_world_units =
+      true;  ///< `spacing`, which counts as in the middle of the source; false: the system's own units
+};
+/// The grid of a projected archive in the reference system of its source, as if it had not been projected: samples that
+/// stand for areas or are posts as the source's do; of an extracted part those on the rectangle around it.
+/// Throws Error{kInvalidArgument} where the box holds nothing, or the source's map is not understood.
+[[nodiscard]] SampleGrid grid_of_source(const Metadata& metadata, const SourceGridRequest& request);
+/// True where coordinates are those of the source.
+[[nodiscard]] bool is_source_system(const Metadata& metadata, const GridSystem& system);
+[[nodiscard]] bool is_in_source_system(const Metadata& metadata, const SampleGrid& grid);
 
 /// The grid of another raster of elevations, in the archive's world or, where the archive's input was projected, in
-/// degrees. By the origins of both, also where one has no unit that is known and their grounds meet; never through a
-/// projection, where it has to be in degrees or on the archive's own map. Its longitudes stay as it counts them: RowReader
+/// the system of that. By the origins of both, also where one has no unit that is known and their grounds meet; never
+/// through a projection, where it has to be in the source's system or on the archive's own map. Its longitudes stay as it counts them: RowReader
 /// finds each column by whole turns. nullopt where nothing ties the two, and it is
 /// to begin in the North-West corner. A warning says what was taken for granted.
 /// Throws Error{kInvalidArgument} where the two are known to be in different units, reference systems or bodies.

@@ -5,6 +5,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -31,13 +32,16 @@ constexpr std::int64_t kRowsOfScratch = 16;
 constexpr double kSampleBytes = 20.0;
 /// What a Surface keeps of decoded tiles.
 constexpr std::uint64_t kDefaultMemory = std::uint64_t{256} << 20U;
-/// What tiles under a grid in degrees take.
+/// What tiles under a grid that goes by places take, at least.
 constexpr std::uint64_t kTileBytes = std::uint64_t{16} << 20U;
-
-/// The coarsest plane with eight vertices between samples of a grid in world units, either way (decision 45).
-int plane_for(const Metadata& metadata, const SampleGrid& grid) {
-  return planes_of(metadata).plane_for_spacing(grid.spacing_x / 8.0, grid.spacing_z / 8.0);
-}
+/// Samples so many times as far apart as the source's are means.
+constexpr double kFarApart = 1.5;
+/// Vertices of a coarse plane between two means, at least.
+constexpr double kPlaneVertices = 32.0;
+/// Places beside each other that are looked at together.
+constexpr std::int64_t kRun = 64;
+/// How far those may be off that are interpolated between others, lattice steps.
+constexpr double kInterpolated = 1e-8;
 
 [[noreturn]] void refuse_place(const char* what) {
   throw Error(ErrorCode::kInvalidArgument,
@@ -49,30 +53,62 @@ GeoPoint geo_of(const SampleGrid& grid, const MapPoint& place) {
   return grid.system ? grid.system->map->geo_from_map(place) : GeoPoint{place.easting, place.northing};
 }
 
-/// Columns and rows of places in the area of each sample that are no farther apart than the archive's vertices, as the
-/// middle of the grid has it; no more than there are vertices.
-GridSize parts_of(const Metadata& metadata, const SampleGrid& grid) {
-  double wide = grid.spacing_x;
-  double high = grid.spacing_z;
-  if (grid.goes_by_places()) {
-    const WorldGeoreference georeference(metadata);
-    if (!georeference.has_geo()) refuse_place("degrees");
-    const MapPoint middle{grid.first_x + static_cast<double>(grid.width - 1) * grid.spacing_x / 2.0,
-                          grid.first_z - static_cast<double>(grid.height - 1) * grid.spacing_z / 2.0};
-    const auto world = [&](double columns, double rows) {
-      const MapPoint at{middle.easting + columns * grid.spacing_x, middle.northing - rows * grid.spacing_z};
-      return georeference.world_from_geo(geo_of(grid, at));
-    };
-    const auto apart = [](WorldPoint a, WorldPoint b) { return std::hypot(b.x - a.x, b.z - a.z); };
-    wide = apart(world(-0.5, 0.0), world(0.5, 0.0));
-    high = apart(world(0.0, -0.5), world(0.0, 0.5));
+/// Between the samples of a grid, world units.
+struct WorldSpacing {
+  double x;
+  double z;
+};
+
+/// As the middle of the grid has it; NaN where the map has no place there.
+WorldSpacing world_spacing(const Metadata& metadata, const SampleGrid& grid) {
+  if (!grid.goes_by_places()) return {grid.spacing_x, grid.spacing_z};
+  const WorldGeoreference georeference(metadata);
+  if (!georeference.has_geo()) refuse_place("degrees");
+  const MapPoint middle{grid.first_x + static_cast<double>(grid.width - 1) * grid.spacing_x / 2.0,
+                        grid.first_z - static_cast<double>(grid.height - 1) * grid.spacing_z / 2.0};
+  const auto world = [&](double columns, double rows) {
+    const MapPoint at{middle.easting + columns * grid.spacing_x, middle.northing - rows * grid.spacing_z};
+    return georeference.world_from_geo(geo_of(grid, at));
+  };
+  const auto apart = [](WorldPoint a, WorldPoint b) { return std::hypot(b.x - a.x, b.z - a.z); };
+  return {apart(world(-0.5, 0.0), world(0.5, 0.0)), apart(world(0.0, -0.5), world(0.0, 0.5))};
+}
+
+/// Whether samples lie so far apart that they are means, either way.
+bool are_far_apart(const Metadata& metadata, const SampleGrid& grid) {
+  const SourceRecord& source = metadata.source;
+  WorldSpacing samples{};
+  WorldSpacing sources{};
+  if (grid.goes_by_places() && is_in_source_system(metadata, grid)) {
+    samples = {grid.spacing_x, grid.spacing_z};
+    sources = {source.crs_spacing_x, source.crs_spacing_y};
+  } else {
+    samples = world_spacing(metadata, grid);
+    sources = {source.spacing_x, source.spacing_z};
+    // Columns and rows that are none of the source's.
+    if (is_warped(metadata) || grid.goes_by_places())
+      sources.x = sources.z = std::sqrt(source.spacing_x * source.spacing_z);
   }
-  const TileGrid& tiles = metadata.grid;
+  constexpr double kLeast = kFarApart * (1.0 - 1e-9);
+  return samples.x >= kLeast * sources.x || samples.z >= kLeast * sources.z;
+}
+
+/// The coarsest plane that means can be made of; 0 where there is none.
+int plane_for(const Metadata& metadata, const SampleGrid& grid) {
+  const WorldSpacing spacing = world_spacing(metadata, grid);
+  return planes_of(metadata).plane_for_spacing(spacing.x / kPlaneVertices, spacing.z / kPlaneVertices);
+}
+
+/// Columns and rows of places in the area of each sample that are no farther apart than the vertices of `tiles`, as the
+/// middle of the grid has it; no more than there are vertices.
+GridSize parts_of(const Metadata& metadata, const SampleGrid& grid, const TileGrid& tiles) {
+  const WorldSpacing spacing = world_spacing(metadata, grid);
   const auto parts = [](double length, double step, double most) {
     const double least = std::min(length, most) / step;  // not a number where the map has no place
     return least > 1.0 ? static_cast<std::int64_t>(std::ceil(least * (1.0 - 1e-9))) : std::int64_t{1};
   };
-  return {parts(wide, 2.0 * tiles.sigma_x(), tiles.world_width()), parts(high, tiles.sigma_z(), tiles.world_height())};
+  return {parts(spacing.x, 2.0 * tiles.sigma_x(), tiles.world_width()),
+          parts(spacing.z, tiles.sigma_z(), tiles.world_height())};
 }
 
 /// Those places: as many in the area of each sample.
@@ -109,12 +145,12 @@ class SourceOutline {
   /// Makes elevations void whose places lie outside. place_of(i): of the i-th; neighbours lie beside each other.
   template <typename PlaceOf>
   void hold(std::span<double> elevations, const PlaceOf& place_of) const {
-    constexpr std::size_t kRun = 64;
-    const std::size_t runs = (elevations.size() + kRun - 1) / kRun;
+    constexpr auto kSome = static_cast<std::size_t>(kRun);
+    const std::size_t runs = (elevations.size() + kSome - 1) / kSome;
     oneapi::tbb::parallel_for(std::size_t{0}, runs, [&](std::size_t run) {
-      const std::size_t end = std::min((run + 1) * kRun, elevations.size());
-      if (is_all_inside(run * kRun, end, place_of)) return;
-      for (std::size_t i = run * kRun; i < end; ++i) {
+      const std::size_t end = std::min((run + 1) * kSome, elevations.size());
+      if (is_all_inside(run * kSome, end, place_of)) return;
+      for (std::size_t i = run * kSome; i < end; ++i) {
         if (std::isnan(elevations[i]) || inside(warp_.source_from_world(place_of(i))) >= -kRounded) continue;
         elevations[i] = std::numeric_limits<double>::quiet_NaN();
       }
@@ -235,8 +271,9 @@ std::string to_string(RestoreMethod method) {
 }
 
 RestoreMethod usual_method(const Metadata& metadata, const SampleGrid& grid) {
-  if (grid.goes_by_places()) return RestoreMethod::kBarycentric;
-  return plane_for(metadata, grid) > 0 ? RestoreMethod::kPlane : RestoreMethod::kHex;
+  if (are_far_apart(metadata, grid))
+    return plane_for(metadata, grid) > 0 ? RestoreMethod::kPlane : RestoreMethod::kAverage;
+  return grid.goes_by_places() ? RestoreMethod::kBarycentric : RestoreMethod::kHex;
 }
 
 RestoreMethod restore_method_from_string(const std::string& text) {
@@ -247,31 +284,36 @@ RestoreMethod restore_method_from_string(const std::string& text) {
 }
 
 struct RowReader::State {
-  State(const ArchiveReader& archive, const SampleGrid& its_grid, RestoreMethod method, const Job& job)
-      : grid(its_grid) {
+  State(const ArchiveReader& archive, const SampleGrid& its_grid, RestoreMethod method, const Job& job, int plane = 0)
+      : grid(its_grid), world(archive.grid()) {
     const Metadata& metadata = archive.metadata();
     require_samples(grid);
     require_known("the method", method, RestoreMethod::kAverage);
     if (grid.system && !grid.system->map)
       throw Error(ErrorCode::kInvalidArgument, "the grid's reference system has no map; see understand_grid_system()");
-    if (method == RestoreMethod::kAverage) {
-      parts = parts_of(metadata, grid);
-      places = std::make_unique<RowReader>(archive, places_of(grid, parts), RestoreMethod::kBarycentric, job);
+    if (method == RestoreMethod::kPlane) plane = plane_for(metadata, grid);
+    const TileGrid tiles = metadata.plane_grid(plane);
+    if (method == RestoreMethod::kAverage || method == RestoreMethod::kPlane) {
+      parts = parts_of(metadata, grid, tiles);
+      places = std::make_unique<State>(archive, places_of(grid, parts), RestoreMethod::kBarycentric, job, plane);
       rows_at_once = std::max<std::int64_t>(kSamplesAtOnce / (grid.width * parts.first * parts.second), 1);
       return;
     }
     rows_at_once = std::max<std::int64_t>(kSamplesAtOnce / grid.width, 1);
     outline = SourceOutline::of(metadata);
     if (!grid.goes_by_places()) {
-      const int plane = method == RestoreMethod::kPlane ? plane_for(metadata, grid) : 0;
-      const TileGrid tiles = metadata.plane_grid(plane);
       rows.emplace(tiles, metadata.wraps_x, metadata.quantisation, tiles_of(archive, plane), grid, method,
                    metadata.grid, choose_memory(tiles, method, job), turn_of(metadata));
       return;
     }
     georeference.emplace(metadata);
     if (!georeference->has_geo()) refuse_place("degrees");
-    points.emplace(metadata.grid, metadata.quantisation, tiles_of(archive), kTileBytes);
+    // Rows that bend come back to the same tiles: two rows of them are kept.
+    const auto row_bytes = static_cast<std::uint64_t>(2 * tiles.tile_columns() * tiles.shape().stored_vertex_count()) *
+                           (metadata.quantisation.type == CodeType::kF32 ? 4 : 2);
+    std::uint64_t kept = std::max(kTileBytes, row_bytes);
+    if (job.memory_bytes > 0) kept = std::min(kept, std::max(kTileBytes, job.memory_bytes / 2));
+    points.emplace(tiles, metadata.quantisation, tiles_of(archive, plane), kept, GroundScale{}, metadata.grid);
   }
 
   /// As many rows at once as there is room for.
@@ -291,17 +333,54 @@ struct RowReader::State {
     return scratch_for(job, in_memory, bytes(true), "this grid");
   }
 
+  /// The place of a sample, whose column may lie between two; NaN where the surface has none.
+  [[nodiscard]] WorldPoint world_of(double column, std::int64_t row) const {
+    const MapPoint place{grid.first_x + column * grid.spacing_x,
+                         grid.first_z - static_cast<double>(row) * grid.spacing_z};
+    return georeference->world_from_geo(geo_of(grid, place));
+  }
+
+  /// Those of some columns from `first` on: by the cubic through four of them where it meets three others.
+  void place_run(std::int64_t first, std::int64_t row, std::span<WorldPoint> at) const {
+    const auto last = static_cast<double>(at.size()) - 1.0;
+    const auto exact = [&](double column) { return world_of(static_cast<double>(first) + column, row); };
+    std::array<WorldPoint, 4> nodes{};
+    const auto cubic = [&](double t) {  // 0 to 3
+      const std::array<double, 4> weights = {(t - 1.0) * (t - 2.0) * (3.0 - t) / 6.0, t * (t - 2.0) * (t - 3.0) / 2.0,
+                                             t * (t - 1.0) * (3.0 - t) / 2.0, t * (t - 1.0) * (t - 2.0) / 6.0};
+      WorldPoint sum{0.0, 0.0};
+      for (std::size_t i = 0; i < 4; ++i) {
+        sum.x += weights[i] * nodes[i].x;
+        sum.z += weights[i] * nodes[i].z;
+      }
+      return sum;
+    };
+    bool is_close = at.size() > 16;
+    if (is_close) {
+      for (std::size_t i = 0; i < 4; ++i) nodes[i] = exact(last * static_cast<double>(i) / 3.0);
+      for (const double t : {0.5, 1.5, 2.5}) {
+        const WorldPoint found = cubic(t);
+        const WorldPoint there = exact(last * t / 3.0);
+        is_close = is_close && std::abs(found.x - there.x) <= kInterpolated * world.sigma_x() &&
+                   std::abs(found.z - there.z) <= kInterpolated * world.sigma_z();
+      }
+    }
+    for (std::size_t c = 0; c < at.size(); ++c) {
+      at[c] = is_close ? cubic(3.0 * static_cast<double>(c) / last) : exact(static_cast<double>(c));
+    }
+  }
+
   void read_by_places(std::int64_t first, std::int64_t count, std::span<double> elevations) {
     ISOHF_ASSERT(elevations.size() == static_cast<std::size_t>(count * grid.width));
     std::vector<WorldPoint> at(elevations.size());
-    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, at.size(), 1024), [&](const auto& part) {
-      for (std::size_t i = part.begin(); i < part.end(); ++i) {
-        const auto sample = static_cast<std::int64_t>(i);
-        const std::int64_t column = sample % grid.width;
-        const std::int64_t row = first + sample / grid.width;
-        const MapPoint place{grid.first_x + static_cast<double>(column) * grid.spacing_x,
-                             grid.first_z - static_cast<double>(row) * grid.spacing_z};
-        at[i] = georeference->world_from_geo(geo_of(grid, place));
+    const std::int64_t runs = (grid.width + kRun - 1) / kRun;
+    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::int64_t>(0, count * runs, 16), [&](const auto& part) {
+      for (std::int64_t run = part.begin(); run < part.end(); ++run) {
+        const std::int64_t column = run % runs * kRun;
+        const std::int64_t columns = std::min(kRun, grid.width - column);
+        place_run(column, first + run / runs,
+                  std::span(at).subspan(static_cast<std::size_t>(run / runs * grid.width + column),
+                                        static_cast<std::size_t>(columns)));
       }
     });
     points->sample(at, elevations);
@@ -322,7 +401,7 @@ struct RowReader::State {
   void average(std::int64_t first, std::int64_t count, std::span<double> elevations) {
     ISOHF_ASSERT(elevations.size() == static_cast<std::size_t>(count * grid.width));
     const auto across = static_cast<std::size_t>(parts.first);
-    const std::int64_t at_once = places->state_->rows_at_once;
+    const std::int64_t at_once = places->rows_at_once;
     std::vector<std::int64_t> counts(elevations.size());
     std::ranges::fill(elevations, 0.0);
     std::vector<double> found;
@@ -352,11 +431,17 @@ struct RowReader::State {
     }
   }
 
+  void read(std::int64_t first, std::int64_t count, std::span<double> elevations) {
+    if (places) return average(first, count, elevations);
+    rows ? read_in_world(first, count, elevations) : read_by_places(first, count, elevations);
+  }
+
   SampleGrid grid;
+  TileGrid world;
   std::int64_t rows_at_once = 1;
   std::int64_t next_row = 0;  ///< the first that may still be read
   GridSize parts = {1, 1};
-  std::unique_ptr<RowReader> places;  ///< whose means are the samples
+  std::unique_ptr<State> places;  ///< whose means are the samples
   std::optional<SourceOutline> outline;
   std::optional<GridSampler> rows;  ///< of a grid in world units
   std::optional<WorldGeoreference> georeference;
@@ -380,15 +465,7 @@ void RowReader::read(std::int64_t first, std::int64_t rows, std::span<double> el
   require_as_many(elevations.size(), static_cast<std::size_t>(rows * grid.width));
   state_->next_row = first + rows;
   if (rows == 0) return;
-  or_out_of_memory(grid_name(grid), [&] {
-    if (state_->places) {
-      state_->average(first, rows, elevations);
-    } else if (state_->rows) {
-      state_->read_in_world(first, rows, elevations);
-    } else {
-      state_->read_by_places(first, rows, elevations);
-    }
-  });
+  or_out_of_memory(grid_name(grid), [&] { state_->read(first, rows, elevations); });
 }
 
 void RowReader::read_all(const Take& take, const Job& job) {

@@ -181,7 +181,7 @@ TEST_F(ExportCommand, CutsMoreTilesThanItHasOpenAtATime) {
 }
 
 TEST_F(ExportCommand, TakesAPartOfTheSourcesGrid) {
-  (void)exported({folder_ / "whole.tif", "--method", "hex"});
+  (void)exported({folder_ / "whole.tif"});
   const Raster whole = read_raster(folder_ / "whole.tif");
   const Georeference& place = whole.info.georeference;
   ASSERT_TRUE(place.has_origin);

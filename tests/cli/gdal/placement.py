@@ -93,7 +93,7 @@ def projections(isohf, folder):
                      "+proj=tmerc +lat_0=0 +lon_0=7 +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=us-ft"):
             archive = folder / "a.isohf"
             isohf.must("convert", source, "-o", archive, "--overwrite", "--type", "f32", "--to-crs", text, "-q")
-            isohf.must("export", archive, folder / "a.tif", "--overwrite", "-q")
+            isohf.must("export", archive, folder / "a.tif", "--overwrite", "-q", "--to-crs", "none")
             far, count = worst(folder / "a.tif", text, middle, axis)
             check(far <= NEAR and count > 100, f"--to-crs {text}: off by {far} m at {count} samples")
             for lon, lat in (middle, (7.21, 46.61), (7.19, 46.592)):
@@ -134,7 +134,7 @@ def globes(isohf, folder):
         for text in ("EPSG:3857", "ESRI:54009"):
             isohf.must("convert", folder / "globe.tif", "-o", folder / "g.isohf", "--overwrite", "--type", "f32", "-q",
                        "--to-crs", text)
-            isohf.must("export", folder / "g.isohf", folder / "g.tif", "--overwrite", "-q")
+            isohf.must("export", folder / "g.isohf", folder / "g.tif", "--overwrite", "-q", "--to-crs", "none")
             raster = gdal.Open(str(folder / "g.tif"))
             x0, dx, _, y0, _, dy = raster.GetGeoTransform()
             heights = raster.ReadAsArray()
@@ -175,7 +175,7 @@ def planets(isohf, folder):
         result = isohf.must("convert", folder / "body.tif", "-o", folder / "b.isohf", "--overwrite", "--type", "f32",
                             "--to-crs", text)
         check(("taken for one" in result.stderr) == loses, f"{own} to {text}: {result.stderr}")
-        isohf.must("export", folder / "b.isohf", folder / "b.tif", "--overwrite", "-q")
+        isohf.must("export", folder / "b.isohf", folder / "b.tif", "--overwrite", "-q", "--to-crs", "none")
         raster = gdal.Open(str(folder / "b.tif"))
         x0, dx, _, y0, _, dy = raster.GetGeoTransform()
         geographic = system(text).CloneGeogCS()
@@ -209,7 +209,7 @@ def joined(isohf, folder):
                              ("auto", None), ("EPSG:3857", "EPSG:3857")):
             archive = folder / "j.isohf"
             isohf.must("convert", *pair, "-o", archive, "--overwrite", "--type", "f32", "--to-crs", text, "-q")
-            isohf.must("export", archive, folder / "j.tif", "--overwrite", "-q")
+            isohf.must("export", archive, folder / "j.tif", "--overwrite", "-q", "--to-crs", "none")
             own = gdal.Open(str(folder / "j.tif")).GetProjection()
             far, count = worst(folder / "j.tif", wanted or own, middle, axis, 2400.0)
             check(far <= NEAR and count > 200, f"joined by {text}: off by {far} m at {count} samples")

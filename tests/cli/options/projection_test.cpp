@@ -111,8 +111,8 @@ TEST_F(ProjectionCommand, LosslessGivesTheInputBackThroughEveryKind) {
     EXPECT_NEAR(back->info().georeference.origin_x, 2.025, 1e-9);
     EXPECT_NEAR(back->info().georeference.origin_y, 49.975, 1e-9);
     EXPECT_DOUBLE_EQ(back->info().georeference.spacing_x, 0.05);
-    // What else is asked for is a raster of the map.
-    ASSERT_EQ(isohf({"export", folder / "a.isohf", folder / "map.tif", "--overwrite", "--method", "hex"}).exit_code, 0);
+    ASSERT_EQ(isohf({"export", folder / "a.isohf", folder / "map.tif", "--overwrite", "--to-crs", "none"}).exit_code,
+              0);
     EXPECT_EQ(open_raster(folder / "map.tif", {})->info().georeference.unit, HorizontalUnit::kMetre);
   }
 }
@@ -133,7 +133,8 @@ TEST_F(ProjectionCommand, LosslessKeepsVoidsAndGroundBeyondTheMap) {
 TEST_F(ProjectionCommand, ShadowsAndPicturesOfAMapAreMade) {
   converts({"--to-crs", "transverse-mercator", "--shadow-seeds"});
   ASSERT_EQ(isohf({"shade", folder / "a.isohf", "-o", folder / "a.tif", "--size", "300x200"}).exit_code, 0);
-  ASSERT_EQ(isohf({"export", folder / "a.isohf", folder / "b.tif", "--size", "300x200"}).exit_code, 0);
+  ASSERT_EQ(isohf({"export", folder / "a.isohf", folder / "b.tif", "--size", "300x200", "--to-crs", "none"}).exit_code,
+            0);
   OpenOptions green;
   green.channel = "1";
   const Georeference drawn = open_raster(folder / "a.tif", green)->info().georeference;

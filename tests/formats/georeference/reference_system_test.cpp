@@ -277,7 +277,7 @@ TEST_F(UnderstandSystem, ArchivesOnAReferenceSystemFindTheirPlacesByIt) {
   EXPECT_TRUE(warnings.empty());
   const SampleGrid there = grid_in_system(archive.metadata(), archive.metadata().valid, utm, GridSize{30, 20}, {});
   EXPECT_TRUE(there.goes_by_places());
-  EXPECT_EQ(usual_method(archive.metadata(), there), RestoreMethod::kBarycentric);
+  EXPECT_EQ(usual_method(archive.metadata(), there), RestoreMethod::kAverage);
   EXPECT_EQ(grid_georeference(archive.metadata(), there)->system.epsg, 32618);
   std::vector<double> rows(600);
   RowReader(archive, there).read(0, 20, rows);
