@@ -91,6 +91,7 @@ ClosedSource::ClosedSource(const Window& window, std::unique_ptr<HeightSource>&&
 ClosedSource::ClosedSource(const Window& window, std::unique_ptr<HeightSource>&& source,
                            std::optional<std::int64_t> other_row)
     : WindowedSource(std::move(source), window) {
+  mutable_info().repeats_column = true;
   if (!other_row) return;
   mutable_info().warnings.push_back(loss(
       fmt::format("{}: column {} is the first one again, 360 degrees on, and is left out, although its samples are "

@@ -147,3 +147,15 @@ check(said["method"] == "plane", f"300 samples apart: by {said['method']}, must 
 # Points of waves of 60 are off by 60 and more.
 exact = samples_of("h.isohf", "--size", "2x2", "--method", "average")[2]
 near(rms(read_npy("h.npy")[2], exact), 0.0, 3.0, "means on a plane")
+
+# A globe whose last column is its first one again has all its columns back, joined or left open.
+globe = write_tiff("globe.tif", 73, 37, lambda x, y: round(900 + 500 * math.sin(math.radians(5 * x)) * math.cos(y / 6.0)),
+                   west=-180.0, north=90.0, spacing=5.0, epsg=4326, point=True)
+for options in ((), ("--no-wrap",), ("--lossless",)):
+    isohf("convert", globe, "-o", "globe.isohf", "--overwrite", "-q", *options)
+    isohf("export", "globe.isohf", "round.tif", "--overwrite", "-q")
+    check(placed("round.tif") == placed(globe), f"a globe {options}: {placed('round.tif')}, must be {placed(globe)}")
+    report = isohf("verify", "globe.isohf", "--against", globe, "--json").json()
+    check(report["passed"], f"a globe {options}: {report}")
+_, _, heights = samples_of("globe.isohf")
+check(heights[0:73 * 37:73] == heights[72:73 * 37:73], "the last column is not the first one again")

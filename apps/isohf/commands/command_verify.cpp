@@ -196,8 +196,8 @@ std::unique_ptr<HeightSource> open_as_recorded(const VerifyCommandOptions& optio
   GroundRequest ground;
   const auto open = [&] {
     OpenedInputs opened = open_inputs(files, input.inputs, input.open, options.work);
-    const bool lost_a_column = opened.source->info().width == record.width + 1;
-    ground.wrap = metadata.wraps_x || lost_a_column ? Wrap::kAlways : Wrap::kNever;
+    const bool repeats_column = record.repeats_column && opened.source->info().width == record.width + 1;
+    ground.wrap = metadata.wraps_x || repeats_column ? Wrap::kAlways : Wrap::kNever;
     return laid_out(std::move(opened.source), input.geoid, ground, true);
   };
   const auto is_scaled_alike = [&](const HeightSource& source) {

@@ -74,6 +74,7 @@ struct SourceRecord {
   std::string format;
   std::int64_t width = 0;
   std::int64_t height = 0;
+  bool repeats_column = false;  ///< had one more column, the first again a turn on
   std::string sample_type;
   std::string channel;
   double z_scale = 1;  ///< elevation = raw sample * z_scale + z_offset, in vertical units

@@ -78,10 +78,11 @@ struct VoidTreatment {
 
 /// All that is known of a raster of elevations before a sample is read.
 struct SourceInfo {
-  std::string path;         ///< for messages
-  std::string format;       ///< "GeoTIFF", "OpenEXR", "PNG", "SRTM HGT", ...
-  std::int64_t width = 0;   ///< columns, >= 1
-  std::int64_t height = 0;  ///< rows, >= 1
+  std::string path;             ///< for messages
+  std::string format;           ///< "GeoTIFF", "OpenEXR", "PNG", "SRTM HGT", ...
+  std::int64_t width = 0;       ///< columns, >= 1
+  std::int64_t height = 0;      ///< rows, >= 1
+  bool repeats_column = false;  ///< one more column, the first again a turn on, was left out
   SampleType sample_type = SampleType::kFloat32;
   std::string channel;                       ///< the chosen channel's name or number; empty where there is but one
   std::vector<double> void_values;           ///< raw values that mean "no elevation"; NaN and infinities always do

@@ -46,6 +46,7 @@ SourceRecord record_of(const SourceInfo& info, const SourceFrame& frame, const S
   record.format = info.format;
   record.width = info.width;
   record.height = info.height;
+  record.repeats_column = info.repeats_column;
   record.sample_type = to_string(info.sample_type);
   record.channel = info.channel;
   record.z_scale = info.z_scale;

@@ -392,10 +392,20 @@ SampleGrid source_grid(const SourceRecord& source) {
           source.first_sample_z, source.spacing_x, source.spacing_z};
 }
 
+namespace {
+
+/// With the one that repeats the first.
+std::int64_t all_columns(const SourceRecord& source) {
+  return source.width + (source.repeats_column ? 1 : 0);
+}
+
+}  // namespace
+
 SampleGrid natural_grid(const Metadata& metadata) {
   const WorldBounds& ground = metadata.valid;
   if (!is_warped(metadata)) {
-    const SampleGrid all = source_grid(metadata.source);
+    SampleGrid all = source_grid(metadata.source);
+    all.width = all_columns(metadata.source);
     return is_cut(metadata) ? part_of(all, ground).value_or(all) : all;
   }
   SampleGrid grid;
@@ -480,7 +490,7 @@ MapBounds shown_of_source(const Metadata& metadata, const GridSystem& system, co
   const double half = place.registration == Registration::kArea ? 0.5 : 0.0;
   const MapBounds all{place.origin_x - half * place.spacing_x,
                       place.origin_y - (static_cast<double>(source.height - 1) + half) * place.spacing_y,
-                      place.origin_x + (static_cast<double>(source.width - 1) + half) * place.spacing_x,
+                      place.origin_x + (static_cast<double>(all_columns(source) - 1) + half) * place.spacing_x,
                       place.origin_y + half * place.spacing_y};
   const WorldBounds& whole = metadata.valid;
   const bool is_whole =
@@ -507,7 +517,7 @@ SampleGrid grid_over_source(const Metadata& metadata, const std::shared_ptr<cons
                            (place.origin_y - shown.north) / place.spacing_y * unit_z,
                            (shown.east - place.origin_x) / place.spacing_x * unit_x,
                            (place.origin_y - shown.south) / place.spacing_y * unit_z};
-  SampleGrid grid{source.width, source.height, 0.0, 0.0, unit_x, unit_z};
+  SampleGrid grid{all_columns(source), source.height, 0.0, 0.0, unit_x, unit_z};
   if (request.size || request.spacing) {
     grid = grid_over(ground, place.registration == Registration::kArea, request.size, request.spacing);
   } else if (const auto part = part_of(grid, ground)) {
@@ -620,7 +630,7 @@ bool is_in_source_system(const Metadata& metadata, const SampleGrid& grid) {
 bool may_have_nodata(const Metadata& metadata, const SampleGrid& grid) {
   if (grid.goes_by_places()) {
     const SourceRecord& source = metadata.source;
-    const bool is_sources = is_in_source_system(metadata, grid) && grid.width == source.width &&
+    const bool is_sources = is_in_source_system(metadata, grid) && grid.width == all_columns(source) &&
                             grid.height == source.height && grid.first_x == source.origin_x &&
                             grid.first_z == source.origin_y && grid.spacing_x == source.crs_spacing_x;
     return !is_sources || is_cut(metadata) || metadata.statistics.voids > 0 || metadata.outside == Outside::kVoid;

@@ -220,6 +220,10 @@ void source_members(JsonMembers& json, SourceRecord& source) {
   source.registration = registration == "area"    ? Registration::kArea
                         : registration == "point" ? Registration::kPoint
                                                   : Registration::kUnknown;
+  std::optional<bool> repeats_column;
+  if (!json.reads() && source.repeats_column) repeats_column = true;
+  json("repeats_column", repeats_column, kAbsent);
+  source.repeats_column = repeats_column.value_or(false);
   json.object("first_sample", "x", source.first_sample_x, "z", source.first_sample_z);
   json.object("spacing", "x", source.spacing_x, "z", source.spacing_z);
   std::optional<double> metres_per_unit;
