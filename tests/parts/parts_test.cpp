@@ -140,6 +140,7 @@ TEST_F(Extract, OfDegreesAndGlobesKeepsElevationsAndPlaces) {
   for (const Registration registration : {Registration::kArea, Registration::kPoint}) {
     for (const char* projection : {"equirectangular", "local", "none"}) {
       options.plan.ground.projection = ProjectionRequest::parse(projection);
+      options.shadow_seeds.reset();
       const auto source = degrees(5.005, 46.995, 0.01, registration);
       (void)convert(*source, folder / "whole.isohf", options);
       const TileGrid grid = ArchiveReader(folder / "whole.isohf").grid();

@@ -157,7 +157,8 @@ TEST_F(ShadeCommand, HillshadesOfAPlaneAreThoseOfItsNormal) {
 
 TEST_F(ShadeCommand, PngHasAWorldFileAndExrHasShares) {
   std::vector<float> heights(12 * 10, 50.0F);
-  heights[0] = -9999.0F;
+  for (const std::size_t row : {0U, 12U, 24U})
+    std::fill_n(heights.begin() + static_cast<std::ptrdiff_t>(row), 3, -9999.0F);
   RasterSpec spec;
   spec.width = 12;
   spec.height = 10;

@@ -109,7 +109,7 @@ def projections(isohf, folder):
         results.append((folder / "t.isohf").read_bytes())
     check(len(set(results)) == 1, "bytes depend on the number of threads")
     for text, why in (("EPSG:4258", "counts degrees and is no map"), ("EPSG:999999", "does not understand"),
-                      ("IAU_2015:49910", "cannot be reached"), ("EPSG:5773", "no projected or geographic")):
+                      ("IAU_2015:49910", "is of Mars, the input of Earth"), ("EPSG:5773", "no projected or geographic")):
         isohf.refuses(why, "convert", folder / "degrees0.tif", "-o", folder / "n.isohf", "--to-crs", text)
 
 
@@ -555,9 +555,9 @@ def voids_of_files(isohf, folder):
     check("3 samples hold -9999," in said and "10 samples hold 32767," in said, f"export of three void values: {said}")
     isohf.must("export", folder / "v.isohf", folder / "v.tif", "--overwrite", "--method", "hex")
     found = gdal.Open(str(folder / "v.tif"))
-    # A vertex beside a void is one.
+    # The surface reaches less than a step of the lattice into what is void.
     count = int(((found.ReadAsArray() < 99) | (found.ReadAsArray() > 102) | numpy.isnan(found.ReadAsArray())).sum())
-    check(16 <= count < 40, f"{count} voids after the remedy, must be 16 and those beside")
+    check(8 <= count <= 16, f"{count} voids after the remedy, must be 16 but for those beside elevations")
 
 
 def beside_samples(isohf, folder):

@@ -23,7 +23,12 @@ TEST(RealData, ConvertsAndPassesEveryCheck) {
     SCOPED_TRACE(file);
     const RunResult converted = run_isohf({"convert", file, folder / "a.isohf", "--overwrite", "--quiet"});
     ASSERT_EQ(converted.exit_code, 0) << converted.err;
-    EXPECT_EQ(converted.err, "");
+    // The last column of one globe is the first again, but for 1 m in some rows.
+    if (file.ends_with("ETOPO1_1deg.tif")) {
+      EXPECT_NE(converted.err.find("is left out, although its samples are others"), std::string::npos) << converted.err;
+    } else {
+      EXPECT_EQ(converted.err, "");
+    }
     const RunResult verified = run_isohf({"verify", folder / "a.isohf", "--against", file, "--json", "--quiet"});
     ASSERT_EQ(verified.exit_code, 0) << verified.out << verified.err;
     const nlohmann::json report = nlohmann::json::parse(verified.out);

@@ -20,10 +20,10 @@ using testing::HasSubstr;
 
 class ZRange : public testing::Test {
  protected:
-  /// A slope from 0 to 858, a step a column, with a few rows of -7 in the South and a void.
+  /// A slope from 0 to 858, a step a column, with a few rows of -7 in the South and a hole.
   ZRange() {
     write_int16_tiff(folder / "slope.tif", 859, 120, [](std::int64_t c, std::int64_t r) {
-      if (r == 40 && c == 20) return std::int16_t{-32768};
+      if (r >= 40 && r < 47 && c >= 20 && c < 27) return std::int16_t{-32768};
       return static_cast<std::int16_t>(r >= 110 ? -7 : c);
     });
   }

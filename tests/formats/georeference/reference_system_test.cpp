@@ -227,7 +227,7 @@ TEST_F(UnderstandSystem, ProjectionsOnAnotherDatumKeepTheWayThere) {
 
   for (const auto& [text, why] : {std::pair{"EPSG:4258", "counts degrees and is no map"},
                                   {"EPSG:99999", "PROJ does not understand it"},
-                                  {"IAU_2015:49910", "cannot be reached"}}) {
+                                  {"IAU_2015:49910", "is of Mars, the input of Earth"}}) {
     request.projection = ProjectionRequest::parse(text);
     const Error error = error_of([&] { understand_ground(info, request); });
     EXPECT_THAT(error.what(), StartsWith("dem: `projection`: ")) << text;
