@@ -450,8 +450,12 @@ void module_wkt(const IsohfProjSystem* system, int dialect, char* wkt) {
 int module_same(const IsohfProjSystem* a, const IsohfProjSystem* b) {
   // Rasters have East before North, whatever the axes, and heights of their own.
   PJ_CONTEXT* const context = a->context.get();
-  const Object ours(proj_crs_demote_to_2D(context, nullptr, a->horizontal.get()));
-  const Object theirs(proj_crs_demote_to_2D(context, nullptr, b->horizontal.get()));
+  const auto as_in_rasters = [&](const Object& system) {
+    const Object flat(proj_crs_demote_to_2D(context, nullptr, system.get()));
+    return Object(flat ? proj_normalize_for_visualization(context, flat.get()) : nullptr);
+  };
+  const Object ours = as_in_rasters(a->horizontal);
+  const Object theirs = as_in_rasters(b->horizontal);
   return ours && theirs ? proj_is_equivalent_to_with_ctx(context, ours.get(), theirs.get(),
                                                          PJ_COMP_EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS)
                         : 0;

@@ -24,6 +24,12 @@ UTM32_ESRI = ('PROJCS["WGS_1984_UTM_Zone_32N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS
               '298.257223563]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],'
               'PARAMETER["False_Easting",500000.0],PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",9.0],'
               'PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]]')
+# Easting before northing, where the code has northing first.
+LAEA = ('PROJCS["ETRS89_ETRS_LAEA",GEOGCS["ETRS89",DATUM["European_Terrestrial_Reference_System_1989",SPHEROID["GRS 1980",'
+        '6378137,298.257222101004]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],'
+        'PROJECTION["Lambert_Azimuthal_Equal_Area"],PARAMETER["latitude_of_center",52],PARAMETER["longitude_of_center",10],'
+        'PARAMETER["false_easting",4321000],PARAMETER["false_northing",3210000],UNIT["metre",1],AXIS["Easting",EAST],'
+        'AXIS["Northing",NORTH]]')
 UNKNOWN_DATUM = UTM32_ESRI.replace("GCS_WGS_1984", "GCS_Unknown").replace("D_WGS_1984", "Unknown").replace(
     "WGS_1984_UTM_Zone_32N", "Unknown_UTM").replace("WGS_1984\",6378137.0,298.257223563", "Intl\",6378388.0,297.0")
 
@@ -121,3 +127,8 @@ refuses("verify", "v.isohf", "--against", esri, code=2, words=["v.isohf", "--crs
 isohf("convert", bare, "p.isohf", "--crs", FOLDER / "mine.prj", "-q")
 (FOLDER / "mine.prj").unlink()
 isohf("verify", "p.isohf", "--against", bare, "-q")
+
+# The same system, in words whose axes stand in another order.
+laea = prj(asc("laea.asc", 3000000.0, 2000000.0, 1000.0).name, LAEA)
+isohf("convert", laea.with_suffix(".asc"), "laea.isohf", "--crs", "EPSG:3035", "-q")
+check("EPSG:3035" in isohf("info", "laea.isohf").out, "the code does not complete the words")
