@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <filesystem>
-#include <iterator>
 #include <system_error>
 
+#include "isohf/base/memory/memory_budget.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -36,13 +36,6 @@ File open_locked(const std::string& path) {
 }
 
 /// "12.3 MB", powers of 1000.
-std::string in_bytes(double bytes) {
-  constexpr const char* kUnits[] = {"bytes", "kB", "MB", "GB", "TB", "PB", "EB"};
-  std::size_t unit = 0;
-  for (; bytes >= 999.5 && unit + 1 < std::size(kUnits); bytes /= 1000.0) ++unit;
-  return fmt::format("{:.3g} {}", bytes, kUnits[unit]);
-}
-
 [[noreturn]] void refuse_to_replace(const std::string& part) {
   throw Error(ErrorCode::kIo, fmt::format("was made by another program meanwhile; what was to replace it is {}", part));
 }

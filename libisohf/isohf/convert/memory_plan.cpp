@@ -276,8 +276,8 @@ std::string remedy_for(const HeightSource& source, const Plan& plan, const Conve
   try {
     const MemoryPlan less = plan_memory(source, make_plan(source.info(), other.plan), other, job);
     if (less.bytes > job.bound_bytes()) return part;
-    return fmt::format("`projection` {}, which takes {}, or {}", kept.name(),
-                       describe_memory(static_cast<double>(less.bytes)), part);
+    return fmt::format("`projection` {}, which takes {}, or {}", kept.name(), in_bytes(static_cast<double>(less.bytes)),
+                       part);
   } catch (const Error&) {  // which that projection is not for
     return part;
   }

@@ -7,6 +7,7 @@
 #endif
 
 #include <cmath>
+#include <iterator>
 #include <vector>
 
 #include "isohf/base/arena.h"
@@ -24,16 +25,19 @@ double reading_bytes(const Job& job, double vertices_of_tile) {
   return kProgramBytes + threads_of(job) * (kThreadBytes + kDecodingBytesPerVertex * vertices_of_tile);
 }
 
-std::string describe_memory(double bytes) {
-  return bytes < 999.5e6 ? fmt::format("{:.3g} MB", bytes / 1e6) : fmt::format("{:.3g} GB", bytes / 1e9);
+std::string in_bytes(double bytes) {
+  constexpr const char* kUnits[] = {"bytes", "kB", "MB", "GB", "TB", "PB", "EB"};
+  std::size_t unit = 0;
+  for (; bytes >= 999.5 && unit + 1 < std::size(kUnits); bytes /= 1000.0) ++unit;
+  return fmt::format("{:.3g} {}", bytes, kUnits[unit]);
 }
 
 void require_memory(const Job& job, double bytes, double least, const std::string& what, const std::string& remedy) {
   if (job.bound_bytes() == 0 || bytes <= static_cast<double>(job.bound_bytes())) return;
   constexpr std::uint64_t kMega = 1000000;
   if (job.memory_bytes == 0) {
-    const std::string needed = describe_memory(least);
-    const std::string most = describe_memory(static_cast<double>(job.bound_bytes()));
+    const std::string needed = in_bytes(least);
+    const std::string most = in_bytes(static_cast<double>(job.bound_bytes()));
     const std::string allow = fmt::format(
         "`memory_bytes` {} allows it{}",
         least < 1e9 ? fmt::format("{}MB", std::ceil(least / 1e6))

@@ -20,7 +20,7 @@ void give_back_freed_memory();
 [[nodiscard]] double reading_bytes(const Job& job, double vertices_of_tile);
 
 /// "80.8 GB", "197 MB".
-[[nodiscard]] std::string describe_memory(double bytes);
+[[nodiscard]] std::string in_bytes(double bytes);
 
 /// Throws Error{kOutOfMemory} if the job's bound does not allow `bytes`; `least` is enough. what  does:
 /// "this conversion"   remedy: other than that
