@@ -63,8 +63,7 @@ std::string text_of(const BoundingBox& box) {
 std::string other_box(const BoundingBox& box, const Georeference& place, const MapBounds& covered) {
   std::vector<PairReading> readings = {own_reading(covered, place.unit == HorizontalUnit::kDegree)};
   const auto take = [&](GeoPoint middle, const std::function<MapPoint(GeoPoint)>& in_own) {
-    readings.push_back(geographic_reading(in_own));
-    if (place.system.body == "Earth" && std::isfinite(middle.latitude)) readings.push_back(utm_reading(middle, in_own));
+    add_geographic_readings(readings, place.system.body, middle, in_own);
   };
   if (place.unit == HorizontalUnit::kDegree) {
     take({covered.middle().easting, covered.middle().northing}, [](GeoPoint at) {

@@ -35,9 +35,7 @@ Error outside(ArchiveReader& archive, const MapBounds& box) {
       const auto in_own = [&](GeoPoint at) { return places.source_from_world(places.world_from_geo(at)); };
       const WorldBounds& all = archive.metadata().valid;
       const GeoPoint middle = places.geo_from_world({(all.x0 + all.x1) / 2.0, (all.z0 + all.z1) / 2.0});
-      readings.push_back(geographic_reading(in_own));
-      if (own.system.body == "Earth" && std::isfinite(middle.longitude))
-        readings.push_back(utm_reading(middle, in_own));
+      add_geographic_readings(readings, own.system.body, middle, in_own);
     }
     if (const auto other = other_reading(box, place->bounds, readings)) {
       remedy = fmt::format("read as {} it is --bbox {}", other->words, text_of(other->bounds));

@@ -65,6 +65,13 @@ PairReading utm_reading(GeoPoint middle, std::function<MapPoint(GeoPoint)> place
           }};
 }
 
+void add_geographic_readings(std::vector<PairReading>& readings, const std::string& body, GeoPoint middle,
+                             const std::function<MapPoint(GeoPoint)>& place) {
+  readings.push_back(geographic_reading(place));
+  const bool is_known = std::isfinite(middle.longitude) && std::isfinite(middle.latitude);
+  if (body == "Earth" && is_known) readings.push_back(utm_reading(middle, place));
+}
+
 std::optional<OtherReading> other_reading(const MapBounds& asked, const MapBounds& covered,
                                           std::span<const PairReading> readings) {
   for (std::size_t i = 0; i < readings.size(); ++i) {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "isohf/projection.h"
 #include "isohf/projection/reference_map.h"
@@ -24,6 +25,10 @@ struct PairReading {
 [[nodiscard]] PairReading geographic_reading(std::function<MapPoint(GeoPoint)> place);
 /// Easting and northing in the UTM zone of WGS 84 around `middle`.
 [[nodiscard]] PairReading utm_reading(GeoPoint middle, std::function<MapPoint(GeoPoint)> place);
+
+/// Adds the last two, UTM on the Earth alone. `middle` is that of the ground that is covered; NaN: not known.
+void add_geographic_readings(std::vector<PairReading>& readings, const std::string& body, GeoPoint middle,
+                             const std::function<MapPoint(GeoPoint)>& place);
 
 /// What numbers may have been meant as.
 struct OtherReading {
