@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <vector>
 
 #include "formats/registry.h"
 #include "interrupt.h"
+#include "isohf/base/file.h"
 #include "isohf/convert.h"
 #include "isohf/error.h"
 #include "machine_memory.h"
@@ -34,8 +34,7 @@ class ScratchArchive {
  public:
   ScratchArchive() : folder_((temporary_folder() / "isohf-view-XXXXXX").string()) {
     if (::mkdtemp(folder_.data()) == nullptr) {
-      throw Error(ErrorCode::kIo,
-                  {temporary_folder().string(), std::strerror(errno), "", "TMPDIR names another folder"});
+      throw Error(ErrorCode::kIo, {temporary_folder().string(), reason(errno), "", "TMPDIR names another folder"});
     }
   }
   ~ScratchArchive() {

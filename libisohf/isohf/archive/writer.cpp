@@ -69,7 +69,11 @@ Digest job_digest(const TileGrid& grid, const WriterOptions& options) {
 /// Returns `path`, once what an interrupted run left there is where this run wants it.
 const std::string& with_old_part_in_place(const std::string& path, const TileGrid& grid, const WriterOptions& options) {
   const std::string part = output_place(path, options.overwrite) + ".part";
-  options.resume ? take_part_back(part, job_digest(grid, options)) : put_part_aside(part);
+  if (options.resume) {
+    take_part_back(part, job_digest(grid, options));
+  } else {
+    put_part_aside(part);
+  }
   return path;
 }
 
