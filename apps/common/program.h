@@ -1,21 +1,45 @@
 #pragma once
 
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <map>
+#include <span>
 #include <string>
-#include <vector>
 
-#include "output/standard_output.h"
+#include "common.h"
 
 namespace isohf::cli {
 
-/// What follows the program's or the command's name on the command line.
-using Arguments = std::vector<std::string>;
+/// Runs a command whose options have been parsed; returns its exit code. Throws Error.
+using Run = std::function<int()>;
 
-/// What main() is: runs `body`, and turns what it throws into one line on standard error and an exit code. `name` is
-/// how messages and help call the program.
-int run_program(const char* name, int argc, char** argv, int (*body)(const Arguments& arguments));
+/// A command: declares its options, and returns what runs it. Options are declared before they are parsed: `add`
+/// touches no file.
+struct Command {
+  const char* name;
+  const char* summary;  ///< for the list of commands
+  const char* heading;  ///< that it stands under in that list
+  Run (*add)(CLI::App& line, Common& common);
+};
 
-/// "isohf 0.1.0" on standard output, or a document with --json.
-void print_version();
+/// A program. One with a single command of the same name ("isohf-view" and "view") is called without it.
+struct Program {
+  const char* name;
+  const char* summary;
+  const char* footer;  ///< of its --help
+  std::span<const Command> commands;
+
+  [[nodiscard]] bool has_commands() const { return commands.size() > 1; }
+};
+
+/// Declares everything in `root`, which the command line, the manual and the completions are made from.
+std::map<const CLI::App*, Run> declare(const Program& program, CLI::App& root, Common& common);
+
+/// Parses and runs; what is thrown becomes one line on common.err. Returns the exit code.
+int run(const Program& program, const Arguments& arguments, Common common = {});
+
+/// What main() is: signals and descriptors made ready, then run().
+int run_main(const Program& program, int argc, char** argv);
 
 /// Becomes the program `name`, which lies beside this one or on the path, with the same descriptors. Throws Error where
 /// it is not installed.

@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
 #include <optional>
 
 #include "experiment.h"
@@ -12,7 +13,8 @@
 #include "isohf/convert.h"
 #include "isohf/error.h"
 #include "isohf/verify.h"
-#include "options/options_common.h"
+#include "options/command_line.h"
+#include "options/work_options.h"
 #include "output/standard_output.h"
 #include "program.h"
 #include "raster_meshes.h"
@@ -20,7 +22,7 @@
 namespace isohf::cli {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kExperimentFooter =
     R"(Without --waves, archives of every RASTER are made, at three densities and by three filters, and compared with
 meshes of squares: one line of CSV each, and at the end on how many the archive errs less. docs/accuracy.md says more.
 --waves fits meshes of equal triangle counts to 22,800 plane sine waves by least squares and writes what is left, the
@@ -60,55 +62,71 @@ std::string compare_raster(const std::string& path, const std::string& archive, 
   return csv;
 }
 
-int experiment(const Arguments& arguments) {
-  CommonOptions common;
-  WorkOptions work;
-  std::vector<std::string> rasters;
-  std::string folder;
+struct Options {
+  const Common& common;
+  WorkOptions work{};
+  std::vector<std::string> rasters{};
+  std::string folder{};
   bool quick = false;
   bool interpolate = false;
-  CommandLine line("experiment",
-                   "Measures iso and ortho meshes on rasters, or on sine waves as section 2 of the paper.");
-  line.group("Options");
-  line.positionals("RASTER...", "Rasters to compare meshes on", rasters);
-  line.option("--waves", "DIR", "Measure sine waves, and write fig2.csv, fig3.csv and fig8.csv there", folder);
-  line.flag("--quick", "A subset of the waves, in seconds", quick);
-  line.flag("--interpolate", "Heights are the wave's own at the vertices, not fitted", interpolate);
-  add_work_options(line, work);
-  add_common_options(line, common);
-  line.footer(kFooter);
-  if (!line.parse(arguments)) return kExitDone;
-  if (folder.empty() == rasters.empty()) throw Error(ErrorCode::kInvalidArgument, "give RASTER..., or --waves DIR");
-  ProgressDisplay display(work.progress, common.quiet, common.verbose);
-  const Job job = job_from(work, display);
-  StandardOutput out;
-  if (!folder.empty()) {
-    experiment::ExperimentSettings settings{.interpolate = interpolate};
-    if (quick) settings.phases = 6, settings.orientations = 40, settings.frequency_stride = 3;
-    std::filesystem::create_directories(folder);
-    const experiment::ExperimentResult result = run_experiment(settings, job);
-    write_output(folder + "/fig2.csv", figure2_csv(result), true);
-    write_output(folder + "/fig3.csv", figure3_csv(result), true);
-    write_output(folder + "/fig8.csv", experiment::figure8_csv(), true);
-  } else {
-    std::string place = (std::filesystem::temp_directory_path() / "isohf-experiment-XXXXXX").string();
-    if (::mkdtemp(place.data()) == nullptr) throw Error(ErrorCode::kIo, place + ": cannot make the folder");
-    int lower = 0;
-    int all = 0;
-    out.write(
-        "raster,density,filter,triangles,rms,squares_rms,ratio,one_diagonal,least_curvature,best,triangles_at_equal_"
-        "rms\n");
-    for (const std::string& raster : rasters) out.write(compare_raster(raster, place + "/a.isohf", job, lower, all));
-    out.write(fmt::format("the archive errs less than squares in {} of {}\n", lower, all));
-    std::filesystem::remove_all(place);
-  }
+};
+
+void measure_waves(const Options& options, const Job& job) {
+  experiment::ExperimentSettings settings{.interpolate = options.interpolate};
+  if (options.quick) settings.phases = 6, settings.orientations = 40, settings.frequency_stride = 3;
+  const std::string& folder = options.folder;
+  std::filesystem::create_directories(folder);
+  const experiment::ExperimentResult result = run_experiment(settings, job);
+  write_output(folder + "/fig2.csv", figure2_csv(result), true);
+  write_output(folder + "/fig3.csv", figure3_csv(result), true);
+  write_output(folder + "/fig8.csv", experiment::figure8_csv(), true);
+}
+
+void compare_rasters(const Options& options, const Job& job) {
+  std::string place = (std::filesystem::temp_directory_path() / "isohf-experiment-XXXXXX").string();
+  if (::mkdtemp(place.data()) == nullptr) throw Error(ErrorCode::kIo, place + ": cannot make the folder");
+  int lower = 0;
+  int all = 0;
+  StandardOutput out(options.common);
+  out.write(
+      "raster,density,filter,triangles,rms,squares_rms,ratio,one_diagonal,least_curvature,best,triangles_at_equal_"
+      "rms\n");
+  for (const std::string& raster : options.rasters)
+    out.write(compare_raster(raster, place + "/a.isohf", job, lower, all));
+  out.write(fmt::format("the archive errs less than squares in {} of {}\n", lower, all));
   out.finish();
+  std::filesystem::remove_all(place);
+}
+
+int run(const Options& options) {
+  if (options.folder.empty() == options.rasters.empty())
+    throw Error(ErrorCode::kInvalidArgument, "give RASTER..., or --waves DIR");
+  ProgressDisplay display(options.common, options.work.progress);
+  const Job job = job_from(options.work, display);
+  options.folder.empty() ? compare_rasters(options, job) : measure_waves(options, job);
   return kExitDone;
 }
+
+Run add_experiment(CLI::App& line, Common& common) {
+  const auto options = std::make_shared<Options>(Options{common});
+  positionals(line, "RASTER...", "Rasters to compare meshes on", options->rasters);
+  option(line, "--waves", "DIR", "Measure sine waves, and write fig2.csv, fig3.csv and fig8.csv there",
+         options->folder);
+  line.add_flag("--quick", options->quick, "A subset of the waves, in seconds");
+  line.add_flag("--interpolate", options->interpolate, "Heights are the wave's own at the vertices, not fitted");
+  add_work_options(line, options->work, common);
+  line.footer(kExperimentFooter);
+  return [options] { return run(*options); };
+}
+
+constexpr Command kCommands[] = {{"experiment", "Measure iso and ortho meshes", "", add_experiment}};
+constexpr Program kProgram = {"isohf-experiment",
+                              "Measures iso and ortho meshes on rasters, or on sine waves as section 2 of the paper.",
+                              "", kCommands};
 
 }  // namespace
 }  // namespace isohf::cli
 
 int main(int argc, char** argv) {
-  return isohf::cli::run_program("isohf-experiment", argc, argv, isohf::cli::experiment);
+  return isohf::cli::run_main(isohf::cli::kProgram, argc, argv);
 }

@@ -13,7 +13,7 @@ namespace isohf::view {
 void run_window(const Options& options);
 
 /// Prints an action's result as --json and --quiet ask for; `json` makes the document where it is wanted.
-void print_result(const cli::CommonOptions& common, const std::string& text,
+void print_result(const cli::Common& common, const std::string& text,
                   const std::function<nlohmann::ordered_json()>& json);
 
 }  // namespace isohf::view

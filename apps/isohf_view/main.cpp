@@ -42,6 +42,7 @@ int take_screenshot(const TileSource& source, const Options& options) {
   session.poll();
   if (session.is_cut() && !options.common.quiet) {
     cli::print_warning(
+        options.common,
         fmt::format("--memory {}M holds the tiles within {:.0f} world units of the eye; what lies beyond is left out",
                     options.memory_mib, session.boxes().figures().radius));
   }
@@ -120,7 +121,7 @@ int verify(const TileSource& source, const Options& options) {
     }
     wanted.tiles = tiles;
   }
-  cli::ProgressDisplay display(cli::ProgressMode::kAuto, options.common.quiet, options.common.verbose);
+  cli::ProgressDisplay display(options.common, cli::ProgressMode::kAuto);
   wanted.progress = [&, check = interrupt_check()](const char* what, std::int64_t done, std::int64_t all) {
     check();
     display.update(what, std::string_view(what) == "tiles" ? "tiles" : "rows", done, all);
@@ -131,31 +132,40 @@ int verify(const TileSource& source, const Options& options) {
   return report.passed() ? cli::kExitDone : cli::kExitDifferences;
 }
 
-int run(const cli::Arguments& arguments) {
-  if (const char* folder = std::getenv("ISOHF_MODULE_PATH"); folder != nullptr) set_module_folder(folder);
-  const std::optional<Options> options = parse_options(arguments);
-  if (!options) return cli::kExitDone;
+int run(const Options& options) {
   static_cast<void>(cli::watch_interrupts());  // from here on
-  if (!options->screenshot.empty()) {
-    cli::check_output_file({options->archive}, options->screenshot, options->overwrite);
-    check_raster_target(options->screenshot, options->overwrite);
+  if (!options.screenshot.empty()) {
+    cli::check_output_file({options.archive}, options.screenshot, options.overwrite);
+    check_raster_target(options.screenshot, options.overwrite);
   }
-  if (options->action == Options::Action::kWindow) {
-    run_window(*options);
+  if (options.screenshot.empty() && !options.verify) {
+    run_window(options);
     return cli::kExitDone;
   }
-  const std::unique_ptr<TileSource> source = open_shown(*options);
+  const std::unique_ptr<TileSource> source = open_shown(options);
   const HeadlessContext context;
   require_gl();
-  return options->action == Options::Action::kScreenshot ? take_screenshot(*source, *options)
-                                                         : verify(*source, *options);
+  return options.verify ? verify(*source, options) : take_screenshot(*source, options);
 }
+
+cli::Run add_view(CLI::App& line, cli::Common& common) {
+  const auto options = std::make_shared<Options>();
+  add_options(line, *options);
+  return [options, &common] {
+    options->common = common;
+    complete(*options);
+    return run(*options);
+  };
+}
+
+constexpr cli::Command kCommands[] = {{"view", "View an archive", "", add_view}};
+constexpr cli::Program kView = {"isohf-view", "Explore an archive or raster in 3D, or render it to a PNG.", "",
+                                kCommands};
 
 }  // namespace
 
-void print_result(const cli::CommonOptions& common, const std::string& text,
-                  const std::function<ordered_json()>& json) {
-  cli::StandardOutput out;
+void print_result(const cli::Common& common, const std::string& text, const std::function<ordered_json()>& json) {
+  cli::StandardOutput out(common);
   if (common.json) {
     out.write(cli::json_text(json()));
   } else if (!common.quiet) {
@@ -167,5 +177,6 @@ void print_result(const cli::CommonOptions& common, const std::string& text,
 }  // namespace isohf::view
 
 int main(int argc, char** argv) {
-  return isohf::cli::run_program("isohf-view", argc, argv, isohf::view::run);
+  if (const char* folder = std::getenv("ISOHF_MODULE_PATH"); folder != nullptr) isohf::set_module_folder(folder);
+  return isohf::cli::run_main(isohf::view::kView, argc, argv);
 }

@@ -82,8 +82,8 @@ std::unique_ptr<ScratchArchive> convert_for_viewing(const Options& options) {
     throw Error(error.code(), fmt::format("{} ({})", why, kWhoseOptions), error.parts());
   }
   if (options.common.quiet) return scratch;
-  cli::print_warnings(warnings);
-  if (std::any_of(warnings.begin(), warnings.end(), names_options)) cli::print_warning(kWhoseOptions);
+  cli::print_warnings(options.common, warnings);
+  if (std::any_of(warnings.begin(), warnings.end(), names_options)) cli::print_warning(options.common, kWhoseOptions);
   return scratch;
 }
 

@@ -79,8 +79,8 @@ std::optional<CastingSun> casting_sun(double azimuth_deg, double elevation_deg, 
 
 Session::Session(const TileSource& source, const Options& options)
     : view(options.view),
-      sun_azimuth_deg(options.sun_azimuth_deg),
-      sun_elevation_deg(options.sun_elevation_deg),
+      sun_azimuth_deg(options.sun.azimuth_deg),
+      sun_elevation_deg(options.sun.elevation_deg),
       source_(source),
       whole_(whole_bounds(source)),
       shared_(shared_geometry(source)),
@@ -105,7 +105,7 @@ Session::Session(const TileSource& source, const Options& options)
     textures_.emplace(source, bytes, limits_from(source, options).workers);
     renderer_.set_textures(
         [this](PlaneTile at) { return at.plane == 0 ? textures_->texture(at.tile) : texture_overview_->texture(); });
-    if (!options.mode_given) view.mode = ColourMode::kTexture;
+    if (!options.mode) view.mode = ColourMode::kTexture;
   } else if (view.mode == ColourMode::kTexture) {
     throw Error(ErrorCode::kInvalidArgument, "--mode texture: this archive has no textures; convert with --texture");
   }

@@ -74,8 +74,9 @@ class Window {
 /// Keys and mouse onto a session. All comes by callback, so that no click is lost between two slow frames.
 class Controls {
  public:
-  Controls(GLFWwindow* window, Session& session)
+  Controls(GLFWwindow* window, Session& session, const cli::Common& common)
       : window_(window),
+        common_(common),
         session_(session),
         ground_(session.source()),
         steering_(session.source(), ground_, session.camera, session.view),
@@ -310,7 +311,7 @@ class Controls {
                           static_cast<int>(static_cast<unsigned>(today.day()))});
     } catch (const Error& error) {
       message = error.what();
-      cli::print_note(message);
+      cli::print_note(common_, message);
     }
   }
 
@@ -331,6 +332,7 @@ class Controls {
   static constexpr double kDoubleClick_s = 0.35;
 
   GLFWwindow* window_;
+  const cli::Common& common_;
   Session& session_;
   Ground ground_;
   Steering steering_;
@@ -363,7 +365,7 @@ void run_window(const Options& options) {
   const Window window(options.view.width, options.view.height, fmt::format("isohf-view - {}", options.archive));
   require_gl();
   Session session(*source, options);
-  Controls controls(window.get(), session);
+  Controls controls(window.get(), session, options.common);
   std::optional<Offscreen> picture;  // the last one
   using Clock = std::chrono::steady_clock;
   auto last = Clock::now();
@@ -408,7 +410,7 @@ void run_window(const Options& options) {
       } catch (const Error& error) {
         controls.message = error.what();
       }
-      if (!options.common.quiet) cli::print_note(controls.message);
+      if (!options.common.quiet) cli::print_note(options.common, controls.message);
     }
     picture->show();
     Session::Shown shown = controls.shown();

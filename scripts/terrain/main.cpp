@@ -10,7 +10,7 @@
 #include <cstring>
 #include <filesystem>
 #include <limits>
-#include <optional>
+#include <memory>
 #include <thread>
 #include <tuple>
 #include <vector>
@@ -19,6 +19,8 @@
 #include "isohf/error.h"
 #include "options/command_line.h"
 #include "options/option_values.h"
+#include "options/work_options.h"
+#include "program.h"
 #include "terrain.h"
 
 namespace isohf::terrain {
@@ -34,7 +36,6 @@ struct Options {
   RasterSpec raster;
   TerrainOptions land;
   int threads = 0;
-  bool quiet = false;
 };
 
 struct Band {
@@ -90,24 +91,22 @@ void describe_ground(Options& options) {
   place.system.epsg = 32633;
 }
 
-std::optional<Options> parse(const cli::Arguments& arguments) {
-  Options options;
+void declare(CLI::App& line, Options& options) {
   RasterSpec& raster = options.raster;
   TerrainOptions& land = options.land;
   raster.width = raster.height = 1024;
   raster.sample_type = SampleType::kInt16;
-  cli::CommandLine line("make_terrain",
-                        "Makes terrain: mountains with eroded valleys, plains and, on request, a coast and voids.");
+  raster.overwrite = true;
   const auto number = [&](const char* flag, const char* name, const char* description, double& value, double least,
                           double most) {
-    line.option(flag, name, fmt::format("{} (default {})", description, value),
+    cli::option(line, flag, name, fmt::format("{} [default: {}]", description, value),
                 [&value, least, most](const auto& text) { value = cli::parse_number_in(text, least, most); });
   };
-  line.positional("OUTPUT", "-o,--output", "File to write: .tif .exr .png .hgt .npy .raw .r16 .r32", options.output);
-  line.option("--size", "WxH", "Columns and rows (default 1024x1024)", [&](const std::string& text) {
+  cli::positional(line, "OUTPUT,-o,--output", "File to write: .tif .exr .png .hgt .npy .raw .r16 .r32", options.output);
+  cli::option(line, "--size", "WxH", "Columns and rows [default: 1024x1024]", [&raster](const std::string& text) {
     std::tie(raster.width, raster.height) = cli::parse_size(text, 1, 2'000'000'000);
   });
-  line.option("--seed", "N", "Make another land for another number", [&](const std::string& text) {
+  cli::option(line, "--seed", "N", "Make another land for another number", [&land](const std::string& text) {
     land.seed =
         static_cast<decltype(land.seed)>(cli::parse_whole_number(text, 0, std::numeric_limits<std::int64_t>::max()));
   });
@@ -117,24 +116,15 @@ std::optional<Options> parse(const cli::Arguments& arguments) {
   number("--feature", "M", "Put the main ridges M metres apart", land.feature_m, 1.0, 1e6);
   number("--roughness", "M", "Largest sensor error of a sample in metres", land.roughness_m, 0.0, 100.0);
   number("--voids", "SHARE", "Share of samples in void patches", land.void_fraction, 0.0, 0.4);
-  line.flag("--coast", "Let the lowlands go under a flat sea at the base", land.coast);
-  line.option("--type", "TYPE", "Sample type: int16, uint16, float32 or half", [&](const std::string& text) {
-    constexpr SampleType kTypes[] = {SampleType::kInt16, SampleType::kUint16, SampleType::kFloat32,
-                                     SampleType::kFloat16};
-    raster.sample_type = kTypes[cli::parse_word(text, {"int16", "uint16", "float32", "half"})];
-  });
-  bool uncompressed = false;
-  line.flag("--uncompressed", "TIFF, EXR: no compression", uncompressed);
-  line.option("-j,--threads", "N", "Threads (default 0: all cores)", [&](const std::string& text) {
-    options.threads = static_cast<int>(cli::parse_whole_number(text, 0, 1024));
-  });
-  line.flag("-q,--quiet", "Print nothing", options.quiet);
-  if (!line.parse(arguments)) return std::nullopt;
-  line.require("OUTPUT", options.output);
-  raster.compress = !uncompressed;
-  raster.overwrite = true;
-  describe_ground(options);
-  return options;
+  line.add_flag("--coast", land.coast, "Let the lowlands go under a flat sea at the base");
+  cli::choice<SampleType>(line, "--type",
+                          {{"int16", SampleType::kInt16},
+                           {"uint16", SampleType::kUint16},
+                           {"float32", SampleType::kFloat32},
+                           {"half", SampleType::kFloat16}},
+                          "Sample type [default: int16]", raster.sample_type);
+  line.add_flag("!--uncompressed", raster.compress, "TIFF, EXR: no compression");
+  cli::add_threads_option(line, options.threads);
 }
 
 void check_range(const Options& options, const Terrain& terrain) {
@@ -180,26 +170,35 @@ void write(const Options& options, const Terrain& terrain, RasterSink& sink) {
   sink.finish();
 }
 
-void make(const Options& options) {
+int make(const Options& options, bool quiet) {
   const Terrain terrain(options.land);
   check_range(options, terrain);
   const auto sink = create_raster(options.output, options.raster);
   write(options, terrain, *sink);
-  if (!options.quiet) {
+  if (!quiet) {
     fmt::print("{}: {} x {} samples, {} bytes\n", options.output, options.raster.width, options.raster.height,
                std::filesystem::file_size(options.output));
   }
-}
-
-int run(const cli::Arguments& arguments) {
-  const std::optional<Options> options = parse(arguments);
-  if (options) make(*options);
   return cli::kExitDone;
 }
+
+cli::Run add_make_terrain(CLI::App& line, cli::Common& common) {
+  const auto options = std::make_shared<Options>();
+  declare(line, *options);
+  return [options, &common] {
+    describe_ground(*options);
+    return make(*options, common.quiet);
+  };
+}
+
+constexpr cli::Command kCommands[] = {{"make_terrain", "Make terrain", "", add_make_terrain}};
+constexpr cli::Program kProgram = {
+    "make_terrain", "Makes terrain: mountains with eroded valleys, plains and, on request, a coast and voids.", "",
+    kCommands};
 
 }  // namespace
 }  // namespace isohf::terrain
 
 int main(int argc, char** argv) {
-  return isohf::cli::run_program("make_terrain", argc, argv, isohf::terrain::run);
+  return isohf::cli::run_main(isohf::terrain::kProgram, argc, argv);
 }

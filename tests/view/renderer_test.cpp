@@ -131,7 +131,7 @@ TEST_F(RendererTest, HasTheSkyOfTheBody) {
     Options options;
     options.view.width = 32;
     options.view.height = 32;
-    options.sun_elevation_deg = 20.0;
+    options.sun.elevation_deg = 20.0;
     options.position = Vec3{100.0, 500.0, 100.0};
     options.look_at = Vec3{100.0, 600.0, 90.0};
     Session session(source, options);
@@ -154,8 +154,8 @@ TEST_F(RendererTest, DrawsShadowsIfTheyAreWanted) {
     options.view.width = 160;
     options.view.height = 120;
     options.exaggeration = 4.0;
-    options.sun_azimuth_deg = azimuth_deg;
-    options.sun_elevation_deg = elevation_deg;
+    options.sun.azimuth_deg = azimuth_deg;
+    options.sun.elevation_deg = elevation_deg;
     Session session(source, options);
     session.shadows = shadows;
     const Offscreen target(160, 120, GL_RGBA8);

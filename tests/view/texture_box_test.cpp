@@ -101,7 +101,7 @@ Options looking_down_options(int width, int height) {
   options.view.width = width;
   options.view.height = height;
   options.exaggeration = 1.0;
-  options.sun_elevation_deg = 12.0;  // light that leaves white below 255, the same everywhere on a plain
+  options.sun.elevation_deg = 12.0;  // light that leaves white below 255, the same everywhere on a plain
   return options;
 }
 
@@ -192,14 +192,14 @@ TEST_F(TextureBoxTest, ShowsElevationColoursWhereThereIsNoTexture) {
   const TexturedPlain source(clear, 64, 4);
   Options options = looking_down_options(200, 120);
   const auto with = picture(source, options, 150.0, 100.0, 150.0);
-  options.mode_given = true;
+  options.mode = ColourMode::kElevation;
   EXPECT_EQ(picture(source, options, 150.0, 100.0, 150.0), with);
   MemoryPhoto photo = waves();
   TexturedPlain holed(photo, 64, 4);
   holed.without = {1, 0};
-  options.mode_given = false;
+  options.mode.reset();
   const auto half = picture(holed, options, 150.0, 50.0, 40.0);  // the middle of tile (1, 0)
-  options.mode_given = true;
+  options.mode = ColourMode::kElevation;
   EXPECT_EQ(picture(holed, options, 150.0, 50.0, 40.0), half);
 }
 

@@ -40,6 +40,25 @@ std::string lower(std::string text) {
   return text;
 }
 
+std::string nearest_word(const std::string& text, const std::vector<std::string>& candidates) {
+  constexpr std::size_t kLongest = 64;
+  if (text.size() > kLongest) return {};
+  const std::string typed = lower(text);
+  std::string best;
+  std::size_t best_distance = std::max<std::size_t>(1, typed.size() / 3) + 1;
+  for (const std::string& candidate : candidates) {
+    const std::string word = lower(candidate);
+    std::size_t distance = edit_distance(typed, word);
+    if (typed.size() >= 3 && word.starts_with(typed)) distance = std::min<std::size_t>(distance, 1);
+    // A letter for another of a word of one letter or two is no slip.
+    if (distance < best_distance && distance < word.size() && (word.size() > 2 || distance == 0)) {
+      best_distance = distance;
+      best = candidate;
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 bool read_number(std::string_view text, double& value) {
@@ -172,6 +191,29 @@ std::uint64_t parse_bytes(const std::string& text) {
   return static_cast<std::uint64_t>(bytes);
 }
 
+TileRange parse_tile_range(const std::string& text) {
+  const auto refuse = [&]() -> std::int64_t {
+    throw Error(
+        ErrorCode::kInvalidArgument,
+        fmt::format("found \"{}\", must be A:B,C:D: columns A to B-1 and rows C to D-1 of tiles, from 0", text));
+  };
+  const auto split = [&](const std::string& of, char at) {
+    const std::size_t place = of.find(at);
+    if (place == std::string::npos) refuse();
+    return std::pair(of.substr(0, place), of.substr(place + 1));
+  };
+  const auto number = [&](const std::string& of) {
+    return of.empty() || of.find_first_not_of("0123456789") != std::string::npos || of.size() > 9 ? refuse()
+                                                                                                  : std::stoll(of);
+  };
+  const auto [columns, rows] = split(text, ',');
+  const auto [west, east] = split(columns, ':');
+  const auto [north, south] = split(rows, ':');
+  const TileRange range{{number(west), number(north)}, {number(east), number(south)}};
+  if (range.is_empty()) refuse();
+  return range;
+}
+
 std::size_t parse_word(const std::string& text, const std::vector<std::string>& words) {
   std::string list;
   for (std::size_t i = 0; i < words.size(); ++i) {
@@ -179,25 +221,6 @@ std::size_t parse_word(const std::string& text, const std::vector<std::string>& 
     list += (i == 0 ? "" : i + 1 == words.size() ? " or " : ", ") + words[i];
   }
   refuse(text, list + did_you_mean(text, words));
-}
-
-std::string nearest_word(const std::string& text, const std::vector<std::string>& candidates) {
-  constexpr std::size_t kLongest = 64;
-  if (text.size() > kLongest) return {};
-  const std::string typed = lower(text);
-  std::string best;
-  std::size_t best_distance = std::max<std::size_t>(1, typed.size() / 3) + 1;
-  for (const std::string& candidate : candidates) {
-    const std::string word = lower(candidate);
-    std::size_t distance = edit_distance(typed, word);
-    if (typed.size() >= 3 && word.starts_with(typed)) distance = std::min<std::size_t>(distance, 1);
-    // A letter for another of a word of one letter or two is no slip.
-    if (distance < best_distance && distance < word.size() && (word.size() > 2 || distance == 0)) {
-      best_distance = distance;
-      best = candidate;
-    }
-  }
-  return best;
 }
 
 std::string did_you_mean(const std::string& text, const std::vector<std::string>& candidates) {

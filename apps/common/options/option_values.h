@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "isohf/shade.h"
+#include "isohf/tile_range.h"
 
 namespace isohf::cli {
 
@@ -34,16 +35,16 @@ namespace isohf::cli {
 [[nodiscard]] std::vector<double> parse_numbers(const std::string& text);
 /// Bytes: 400M, 1.5GiB, 2GB; K, M, G, T and KiB... are powers of 1024, KB, MB, GB, TB powers of 1000.
 [[nodiscard]] std::uint64_t parse_bytes(const std::string& text);
+/// "A:B,C:D": columns A to B-1 and rows C to D-1 of tiles.
+[[nodiscard]] TileRange parse_tile_range(const std::string& text);
 /// One of `words`; returns its place.
 [[nodiscard]] std::size_t parse_word(const std::string& text, const std::vector<std::string>& words);
 
 /// A number and nothing else, blanks included; false otherwise. Locale-independent. Reads "nan" and "inf".
 [[nodiscard]] bool read_number(std::string_view text, double& value);
 
-/// The candidate that was probably meant by `text`: a slip or two of the fingers away, or begun with it; empty where
-/// there is none.
-[[nodiscard]] std::string nearest_word(const std::string& text, const std::vector<std::string>& candidates);
-/// "; did you mean NEAREST?", or nothing.
+/// "; did you mean NEAREST?" of the candidate that was probably meant by `text`: a slip or two of the fingers away, or
+/// begun with it. Empty if there is none.
 [[nodiscard]] std::string did_you_mean(const std::string& text, const std::vector<std::string>& candidates);
 
 }  // namespace isohf::cli

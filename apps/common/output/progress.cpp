@@ -8,7 +8,6 @@
 #include "options/describe.h"
 #include "output/standard_output.h"
 #include "output/terminal.h"
-#include "program.h"
 
 namespace isohf::cli {
 namespace {
@@ -19,19 +18,19 @@ constexpr milliseconds kBarInterval{100};
 constexpr milliseconds kLineInterval{2000};
 constexpr std::size_t kBarCells = 24;
 
-void write_to_terminal(const std::string& text) {
+void write_to_terminal(int file, const std::string& text) {
   // A terminal that has gone away is no reason to stop.
-  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
+  [[maybe_unused]] const ssize_t written = ::write(file, text.data(), text.size());
 }
 
 }  // namespace
 
-ProgressDisplay::ProgressDisplay(ProgressMode mode, bool quiet, bool verbose) : style_(Style::kNothing) {
-  if (quiet || mode == ProgressMode::kNone) return;
+ProgressDisplay::ProgressDisplay(const Common& common, ProgressMode mode) : common_(common), style_(Style::kNothing) {
+  if (common.quiet || mode == ProgressMode::kNone) return;
   if (mode == ProgressMode::kJson) style_ = Style::kJson;
   if (mode == ProgressMode::kPlain) style_ = Style::kLines;
   if (mode == ProgressMode::kAuto) {
-    style_ = terminal_columns(STDERR_FILENO) > 0 ? Style::kBar : verbose ? Style::kLines : Style::kNothing;
+    style_ = terminal_columns(common.err) > 0 ? Style::kBar : common.verbose ? Style::kLines : Style::kNothing;
   }
 }
 
@@ -40,7 +39,7 @@ ProgressDisplay::~ProgressDisplay() {
 }
 
 void ProgressDisplay::clear() {
-  if (bar_is_shown_) write_to_terminal("\r\x1b[K");
+  if (bar_is_shown_) write_to_terminal(common_.err, "\r\x1b[K");
   bar_is_shown_ = false;
 }
 
@@ -63,6 +62,7 @@ void ProgressDisplay::update(const std::string& what, const std::string& unit, s
   const double part = total > 0 ? std::clamp(static_cast<double>(done) / static_cast<double>(total), 0.0, 1.0) : 1.0;
   if (style_ == Style::kJson) {
     print_progress(
+        common_,
         fmt::format(R"({{"progress":"{}","unit":"{}","done":{},"total":{},"seconds":{:.3f},"seconds_left":{:.3f}}})",
                     what, unit, done, total, seconds, left));
     return;
@@ -71,17 +71,17 @@ void ProgressDisplay::update(const std::string& what, const std::string& unit, s
   if (rate > 0.0) text += fmt::format("  {:.4g} {}/s", rate, unit);
   if (rate > 0.0 && !is_last) text += fmt::format("  {} left", describe_seconds(left));
   if (style_ == Style::kLines) {
-    print_note(text);
+    print_note(common_, text);
     return;
   }
   // A line that is wider than the terminal cannot be overwritten. The bar gives way before the figures do.
-  const std::size_t columns = terminal_columns(STDERR_FILENO);
+  const std::size_t columns = terminal_columns(common_.err);
   const std::size_t room = columns > text.size() + 4 ? std::min(columns - text.size() - 4, kBarCells) : 0;
   const auto cells = static_cast<std::size_t>(part * static_cast<double>(room));
   if (columns > 0) text.resize(std::min(text.size(), columns - 1));
   const std::string bar =
       room == 0 ? "" : fmt::format("[{}{}] ", std::string(cells, '#'), std::string(room - cells, '.'));
-  write_to_terminal(fmt::format("\r{}{}\x1b[K", bar, text));
+  write_to_terminal(common_.err, fmt::format("\r{}{}\x1b[K", bar, text));
   bar_is_shown_ = true;
 }
 

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <string>
 
+#include "common.h"
+
 namespace isohf::cli {
 
 /// In the order of --progress's words.
@@ -13,8 +15,8 @@ enum class ProgressMode { kAuto, kPlain, kJson, kNone };
 /// lines otherwise. Erases its bar when it goes.
 class ProgressDisplay {
  public:
-  /// `quiet` silences it; kAuto is a bar on a terminal, plain lines where `verbose`, else nothing.
-  ProgressDisplay(ProgressMode mode, bool quiet, bool verbose);
+  /// -q silences it; kAuto is a bar on a terminal, plain lines with -v, else nothing.
+  ProgressDisplay(const Common& common, ProgressMode mode);
   ~ProgressDisplay();
   ProgressDisplay(const ProgressDisplay&) = delete;
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
@@ -28,6 +30,7 @@ class ProgressDisplay {
   using Clock = std::chrono::steady_clock;
   enum class Style { kNothing, kBar, kLines, kJson };
 
+  const Common& common_;
   Style style_;
   std::string what_;
   Clock::time_point started_;

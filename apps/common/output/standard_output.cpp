@@ -61,28 +61,13 @@ constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
     {"z_scale", "--z-scale"},
 };
 
-/// The text with settings between backticks as options.
-std::string spelled(std::string text) {
-  for (std::size_t open = 0; (open = text.find('`', open)) != std::string::npos; ++open) {
-    const std::size_t close = text.find('`', open + 1);
-    if (close == std::string::npos) break;
-    const std::string_view name = std::string_view(text).substr(open + 1, close - open - 1);
-    for (const auto& [setting, option] : kSpellings) {
-      if (name != setting) continue;
-      text.replace(open, close - open + 1, option);
-      break;
-    }
-  }
-  return text;
-}
-
 /// Writes a line in one call, so that lines of two processes do not mix; what cannot be told is not told.
-void write_line_to_stderr(const std::string& text) {
-  const std::string line = spelled(text) + '\n';
+void write_line(int file, const std::string& text) {
+  const std::string line = text + '\n';
   const char* data = line.data();
   std::size_t left = line.size();
   while (left > 0) {
-    const ssize_t written = ::write(STDERR_FILENO, data, left);
+    const ssize_t written = ::write(file, data, left);
     if (written < 0 && errno == EINTR) continue;
     if (written <= 0) return;
     data += written;
@@ -112,19 +97,20 @@ std::string line_of(const ordered_json& object) {
 }
 
 /// A line for people, `head` of them styled, or the JSON object that says the same.
-void tell(const std::string& head, Style style, const std::string& text, const ordered_json& object) {
-  if (telling().json_notes) return write_line_to_stderr(line_of(object));
-  const std::string name = program_name() + ":";
-  write_line_to_stderr((style == Style::kWarning ? name + " " + styled(head, style, STDERR_FILENO)
-                                                 : styled(name, style, STDERR_FILENO) + head) +
-                       " " + printable(text));
+void tell(const Common& common, const std::string& head, Style style, const std::string& text,
+          const ordered_json& object) {
+  if (common.json_notes) return write_line(common.err, line_of(object));
+  const std::string name = common.name + ":";
+  write_line(common.err, (style == Style::kWarning ? name + " " + styled(head, style, common.err)
+                                                   : styled(name, style, common.err) + head) +
+                             " " + printable(text));
 }
 
-int report(const std::string& text, const ordered_json& object, int exit_code) {
-  tell("", Style::kError, text, object);
-  if (!telling().json) return exit_code;
+int report(const Common& common, const std::string& text, const ordered_json& object, int exit_code) {
+  tell(common, "", Style::kError, text, object);
+  if (!common.json) return exit_code;
   try {
-    StandardOutput out;
+    StandardOutput out(common);
     out.write(line_of(object) + "\n");
     out.finish();
   } catch (const OutputClosed&) {
@@ -136,13 +122,13 @@ int report(const std::string& text, const ordered_json& object, int exit_code) {
 }  // namespace
 
 void StandardOutput::write(std::string_view text) {
-  // Documents quote what the library said, and what stands in files; rows of numbers pass as they are.
+  // Text quotes what stands in files; rows of numbers pass as they are.
   const bool is_plain = std::ranges::all_of(text, [](char c) {
     const auto byte = static_cast<unsigned char>(c);
-    return (byte >= 0x20 && byte < 0x7f && c != '`') || c == '\n';
+    return (byte >= 0x20 && byte < 0x7f) || c == '\n';
   });
   if (is_plain) return write_styled(text);
-  write_styled(without_controls(spelled(std::string(text)), "\n\t"));
+  write_styled(without_controls(std::string(text), "\n\t"));
 }
 
 void StandardOutput::write_styled(std::string_view text) {
@@ -153,7 +139,7 @@ void StandardOutput::write_styled(std::string_view text) {
 void StandardOutput::flush() {
   std::size_t from = 0;
   while (from < pending_.size()) {
-    const ssize_t written = ::write(STDOUT_FILENO, pending_.data() + from, pending_.size() - from);
+    const ssize_t written = ::write(file_, pending_.data() + from, pending_.size() - from);
     if (written < 0) {
       if (errno == EINTR) continue;
       if (errno == EPIPE) throw OutputClosed{};
@@ -174,39 +160,51 @@ int exit_code_for(ErrorCode code) {
   return kExitFailed;
 }
 
-std::string& program_name() {
-  static std::string name = "isohf";
-  return name;
+std::string spelled(std::string text) {
+  for (std::size_t open = 0; (open = text.find('`', open)) != std::string::npos; ++open) {
+    const std::size_t close = text.find('`', open + 1);
+    if (close == std::string::npos) break;
+    const std::string_view name = std::string_view(text).substr(open + 1, close - open - 1);
+    for (const auto& [setting, option] : kSpellings) {
+      if (name != setting) continue;
+      text.replace(open, close - open + 1, option);
+      break;
+    }
+  }
+  return text;
 }
 
-Telling& telling() {
-  static Telling how;
-  return how;
-}
-
-void print_warnings(const std::vector<Warning>& warnings) {
-  if (telling().strict && !warnings.empty()) throw error_from(warnings);
+void print_warnings(const Common& common, const std::vector<Warning>& warnings) {
+  if (common.strict && !warnings.empty()) throw error_from(warnings);
   for (const Warning& warning : warnings) {
     const bool is_loss = warning.kind == Warning::Kind::kLoss;
-    if (telling().quiet && !is_loss) continue;
-    tell("warning:", Style::kWarning, warning,
-         {{"warning", {{"kind", is_loss ? "loss" : "note"}, {"message", warning.c_str()}}}});
+    if (common.quiet && !is_loss) continue;
+    const std::string text = spelled(warning);
+    tell(common, "warning:", Style::kWarning, text,
+         {{"warning", {{"kind", is_loss ? "loss" : "note"}, {"message", text}}}});
   }
 }
 
-void print_warning(const Warning& warning) {
-  print_warnings({warning});
+void print_warning(const Common& common, const Warning& warning) {
+  print_warnings(common, {warning});
+}
+
+ordered_json json_from(const std::vector<Warning>& warnings) {
+  ordered_json list = ordered_json::array();
+  for (const Warning& warning : warnings) list.push_back(spelled(warning));
+  return list;
 }
 
 ordered_json json_from(const Error& error, int exit_code) {
   // In the order of ErrorCode.
   static constexpr std::array kCodes = {"invalid-argument", "io",        "unsupported", "corrupt",
                                         "out-of-memory",    "cancelled", "warning",     "no-elevation"};
-  ordered_json json = {
-      {"code", kCodes.at(static_cast<std::size_t>(error.code()))}, {"exit_code", exit_code}, {"message", error.what()}};
+  ordered_json json = {{"code", kCodes.at(static_cast<std::size_t>(error.code()))},
+                       {"exit_code", exit_code},
+                       {"message", spelled(error.what())}};
   const ErrorParts parts = error.parts();
   const auto add = [&](const char* name, const std::string& text) {
-    if (!text.empty()) json[name] = text;
+    if (!text.empty()) json[name] = spelled(text);
   };
   add("where", parts.where);
   add("found", parts.found);
@@ -215,25 +213,25 @@ ordered_json json_from(const Error& error, int exit_code) {
   return json;
 }
 
-void print_error_line(const Error& error) {
-  tell("", Style::kError, error.what(), {{"error", json_from(error, exit_code_for(error.code()))}});
+void print_error_line(const Common& common, const Error& error) {
+  tell(common, "", Style::kError, spelled(error.what()), {{"error", json_from(error, exit_code_for(error.code()))}});
 }
 
-int print_error(const Error& error, int exit_code) {
-  return report(error.what(), {{"error", json_from(error, exit_code)}}, exit_code);
+int print_error(const Common& common, const Error& error, int exit_code) {
+  return report(common, spelled(error.what()), {{"error", json_from(error, exit_code)}}, exit_code);
 }
 
-int print_internal_error(const std::string& what) {
-  return report("internal error: " + what,
+int print_internal_error(const Common& common, const std::string& what) {
+  return report(common, "internal error: " + what,
                 {{"error", {{"code", "internal"}, {"exit_code", +kExitFailed}, {"message", what}}}}, kExitFailed);
 }
 
-void print_note(const std::string& text) {
-  write_line_to_stderr(telling().json_notes ? line_of({{"note", text}}) : program_name() + ": " + printable(text));
+void print_note(const Common& common, const std::string& text) {
+  write_line(common.err, common.json_notes ? line_of({{"note", text}}) : common.name + ": " + printable(text));
 }
 
-void print_progress(const std::string& line) {
-  write_line_to_stderr(printable(line));
+void print_progress(const Common& common, const std::string& line) {
+  write_line(common.err, printable(line));
 }
 
 }  // namespace isohf::cli

@@ -5,25 +5,13 @@
 #include <string_view>
 #include <vector>
 
+#include "common.h"
 #include "isohf/error.h"
 
 namespace isohf::cli {
 
-/// How the programs end (docs/cli.md).
-enum ExitCode : int {
-  kExitDone = 0,
-  kExitFailed = 1,
-  kExitUsage = 2,
-  kExitDifferences = 3,  ///< verify or diff found some
-  kExitInterrupted = 130,
-  kExitOutputClosed = 141,  ///< as a shell reports SIGPIPE
-};
-
 /// What a program ends with after an error of that code.
 [[nodiscard]] int exit_code_for(ErrorCode code);
-
-/// How messages and help call the program; run_program() sets it.
-[[nodiscard]] std::string& program_name();
 
 /// Buffered writing to standard output, every failure noticed.
 ///
@@ -31,6 +19,7 @@ enum ExitCode : int {
 /// Error{kIo}.
 class StandardOutput {
  public:
+  explicit StandardOutput(const Common& common) : file_(common.out) {}
   /// Text that may quote files: control characters but for ends of lines and tabs become blanks, as printable() has it.
   void write(std::string_view text);
   /// Text of the program's own, with escape codes.
@@ -41,6 +30,7 @@ class StandardOutput {
   void finish() { flush(); }
 
  private:
+  int file_;
   std::string pending_;
 };
 
@@ -48,33 +38,28 @@ class StandardOutput {
 /// Unicode as well, become blanks.
 [[nodiscard]] std::string printable(std::string text);
 
-/// Thrown where standard output's reader has gone; run_program() ends by SIGPIPE.
+/// Thrown if standard output has no reader any more; run_main() ends by SIGPIPE.
 struct OutputClosed {};
 
-/// How this run tells of warnings and errors; one for the process, as its streams are. The options set it.
-struct Telling {
-  bool json = false;        ///< --json: an error is a document on standard output as well
-  bool json_notes = false;  ///< --progress json: every line on standard error is a JSON object
-  bool quiet = false;       ///< -q: of warnings only those of kind kLoss
-  bool strict = false;      ///< --strict: a warning is an error
-};
-[[nodiscard]] Telling& telling();
-
-/// One line on standard error for each: "PROGRAM: warning: ...". Throws Error{kWarning} where strict.
-void print_warnings(const std::vector<Warning>& warnings);
-void print_warning(const Warning& warning);
-/// One line on standard error: "PROGRAM: ...".
-void print_error_line(const Error& error);
+/// One line on standard error for each: "isohf convert: warning: ...". Throws Error{kWarning} if common.strict.
+void print_warnings(const Common& common, const std::vector<Warning>& warnings);
+void print_warning(const Common& common, const Warning& warning);
+/// One line on standard error: "isohf convert: ...".
+void print_error_line(const Common& common, const Error& error);
 /// The same, and with --json {"error": ...} on standard output. Returns `exit_code`.
-int print_error(const Error& error, int exit_code);
+int print_error(const Common& common, const Error& error, int exit_code);
 /// The same for what is a fault of the program's own.
-int print_internal_error(const std::string& what);
+int print_internal_error(const Common& common, const std::string& what);
+/// Text of the library, with the options in place of the settings that it names between backticks.
+[[nodiscard]] std::string spelled(std::string text);
+/// Warnings of a document.
+[[nodiscard]] nlohmann::ordered_json json_from(const std::vector<Warning>& warnings);
 /// The member `error` of such a document: code, exit_code, message, and of where, found, required and remedy what is
 /// known.
 [[nodiscard]] nlohmann::ordered_json json_from(const Error& error, int exit_code);
-/// One line on standard error: "PROGRAM: ...".
-void print_note(const std::string& text);
+/// One line on standard error: "isohf convert: ...".
+void print_note(const Common& common, const std::string& text);
 /// One line on standard error as it stands.
-void print_progress(const std::string& line);
+void print_progress(const Common& common, const std::string& line);
 
 }  // namespace isohf::cli

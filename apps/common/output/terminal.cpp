@@ -13,7 +13,6 @@ namespace {
 
 constexpr std::size_t kLeastWidth = 80;
 constexpr std::size_t kMostWidth = 120;
-constexpr std::size_t kWidthWithoutTerminal = 100;
 
 std::string_view setting(const char* name) {
   const char* value = std::getenv(name);
@@ -44,12 +43,12 @@ std::size_t terminal_columns(int file) {
   return takes_escapes(file) ? columns_of(file) : 0;
 }
 
-std::size_t text_width() {
+std::size_t text_width(int file) {
   const std::string_view columns = setting("COLUMNS");
   std::size_t width = 0;
   std::from_chars(columns.data(), columns.data() + columns.size(), width);
-  if (width == 0) width = columns_of(STDOUT_FILENO);
-  return width == 0 ? kWidthWithoutTerminal : std::clamp(width, kLeastWidth, kMostWidth);
+  if (width == 0) width = columns_of(file);
+  return width == 0 ? kLeastWidth : std::clamp(width, kLeastWidth, kMostWidth);
 }
 
 std::string styled(std::string_view text, Style style, int file) {

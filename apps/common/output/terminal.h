@@ -5,8 +5,8 @@
 
 namespace isohf::cli {
 
-/// Columns for text on standard output: COLUMNS or the terminal's, 80 to 120; 100 where there is no terminal.
-[[nodiscard]] std::size_t text_width();
+/// Columns for text in `file`: COLUMNS or the terminal's, 80 to 120; 80 if there is no terminal.
+[[nodiscard]] std::size_t text_width(int file);
 /// Columns of the terminal behind `file`; 0 where there is none, or one that moves no cursor (TERM=dumb).
 [[nodiscard]] std::size_t terminal_columns(int file);
 

@@ -4,19 +4,22 @@
 
 namespace isohf::cli {
 
-/// The commands, as Command::run is.
+/// The commands, as Command::add is.
 
-int command_convert(const Arguments& arguments);
-int command_diff(const Arguments& arguments);
-int command_export(const Arguments& arguments);
-int command_extract(const Arguments& arguments);
-int command_formats(const Arguments& arguments);
-int command_info(const Arguments& arguments);
-int command_merge(const Arguments& arguments);
-int command_plan(const Arguments& arguments);
-int command_sample(const Arguments& arguments);
-int command_shade(const Arguments& arguments);
-int command_verify(const Arguments& arguments);
-int command_view(const Arguments& arguments);
+Run add_convert(CLI::App& line, Common& common);
+Run add_diff(CLI::App& line, Common& common);
+Run add_export(CLI::App& line, Common& common);
+Run add_extract(CLI::App& line, Common& common);
+Run add_formats(CLI::App& line, Common& common);
+Run add_info(CLI::App& line, Common& common);
+Run add_merge(CLI::App& line, Common& common);
+Run add_plan(CLI::App& line, Common& common);
+Run add_sample(CLI::App& line, Common& common);
+Run add_shade(CLI::App& line, Common& common);
+Run add_verify(CLI::App& line, Common& common);
+Run add_view(CLI::App& line, Common& common);
+
+/// isohf, with all of them.
+extern const Program kIsohf;
 
 }  // namespace isohf::cli

@@ -36,9 +36,10 @@
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "isohf/resampling.h"
+#include "options/command_line.h"
 #include "options/describe.h"
 #include "options/option_values.h"
-#include "options/options_common.h"
+#include "options/work_options.h"
 #include "output/accuracy_output.h"
 #include "output/json_output.h"
 #include "output/output_kinds.h"
@@ -50,6 +51,20 @@ namespace isohf::cli {
 namespace {
 
 using nlohmann::ordered_json;
+
+constexpr const char* kConvertFooter =
+    R"(The archive is written as OUTPUT.part and renamed when it is complete; an interrupted run leaves the part for --resume
+and nothing under the final name. isohf plan takes the same options and previews what comes out.
+
+Examples:
+  isohf convert dem.tif dem.isohf
+  isohf convert dem.tif dem.isohf --max-error 5
+  isohf convert N4*E00*.hgt alps.isohf               join many tiles
+  isohf convert tiles/ -o land.isohf --strict        fail if a tile is missing
+  isohf convert heights.exr h.isohf --z-scale 1200 --sample-spacing 2
+  isohf convert dem.tif dem.isohf --texture orthophoto.tif
+  isohf convert dems/ --recursive --out-dir archives --keep-going
+  isohf convert tiles/ -o part-3.isohf --shard 3/64 --z-range -100:5000)";
 
 struct Measured {
   double samples_per_second = 0.0;  ///< of the source
@@ -97,7 +112,7 @@ ordered_json document_of(const ConvertCommandOptions& options, const ConvertSumm
           {"seconds", summary.seconds},
           {"source_samples_per_second", measured.samples_per_second},
           {"peak_memory_bytes", measured.peak_memory_bytes},
-          {"warnings", summary.warnings},
+          {"warnings", json_from(summary.warnings)},
           {"metadata", ordered_json::parse(ArchiveReader(options.output).metadata_json())}};
 }
 
@@ -232,9 +247,9 @@ void make_folders(const std::vector<EachFile>& files) {
   }
 }
 
-/// The files of --each, their archives where they may be written.
+/// The files of --out-dir, whose archives may be written.
 std::vector<EachFile> checked_files(const ConvertCommandOptions& options) {
-  std::vector<EachFile> files = files_of_each(options.inputs.names, options.inputs.recursive, options.each.folder);
+  std::vector<EachFile> files = files_of_each(options.inputs.names, options.inputs.recursive, options.out_dir);
   std::error_code none;
   std::set<std::filesystem::path> inputs;
   for (const EachFile& file : files) inputs.insert(std::filesystem::weakly_canonical(file.input, none));
@@ -257,7 +272,7 @@ std::vector<EachFile> checked_files(const ConvertCommandOptions& options) {
   return files;
 }
 
-/// One of --each; nullopt where the share is too small for it.
+/// One of --out-dir; nullopt where the share is too small for it.
 std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachFile& file, const EachShare& share) {
   /// What one thread does in a fraction of a second.
   constexpr std::int64_t kSmallSamples = std::int64_t{1} << 24U;
@@ -291,28 +306,24 @@ std::optional<EachResult> convert_one(ConvertCommandOptions options, const EachF
 
 int run_each(const ConvertCommandOptions& options) {
   return convert_each(
-      checked_files(options), options.each, options.work, options.common,
+      checked_files(options), options.keep_going, options.work, options.common,
       [&](const EachFile& file, const EachShare& share) { return convert_one(options, file, share); },
       watch_interrupts());
 }
 
 int run(ConvertCommandOptions options) {
-  const CommonOptions& common = options.common;
+  const Common& common = options.common;
   const bool may_exist = options.convert.overwrite || options.convert.resume;
   // What the output is can be told before anything is looked for.
-  if (!options.dry_run) check_archive_output(options.inputs.names, options.output, may_exist);
+  check_archive_output(options.inputs.names, options.output, may_exist);
   std::vector<std::string> files = expand_inputs(options.inputs.names, options.inputs.recursive);
-  if (!options.dry_run) check_archive_output(files, options.output, may_exist);
+  check_archive_output(files, options.output, may_exist);
   const Prepared prepared = prepare(options, std::move(files));
   HeightSource& source = *prepared.source;
-  std::optional<ProgressDisplay> display(std::in_place, options.work.progress, common.quiet, common.verbose);
+  std::optional<ProgressDisplay> display(std::in_place, options.common, options.work.progress);
   const Job job = job_from(options.work, *display);
-  if (options.dry_run) {
-    print_plan(source, options.convert, job, common);
-    return kExitDone;
-  }
   if (is_complete(options, prepared)) {
-    StandardOutput out;
+    StandardOutput out(common);
     if (common.json) out.write(json_text(json_of_complete(options.input, options.output)));
     if (!common.json && !common.quiet) {
       out.write(fmt::format("{}: complete already, made of this input with these options\n", options.output));
@@ -320,8 +331,9 @@ int run(ConvertCommandOptions options) {
     out.finish();
     return kExitDone;
   }
-  if (common.verbose && !common.quiet) print_plan_notes(source, options.convert, job);
-  if (const std::string note = note_of_interrupted_run(options); !note.empty() && !common.quiet) print_note(note);
+  if (common.verbose && !common.quiet) print_plan_notes(source, options.convert, job, common);
+  if (const std::string note = note_of_interrupted_run(options); !note.empty() && !common.quiet)
+    print_note(common, note);
   const ConvertSummary summary = [&] {
     try {
       return convert(source, options.output, options.convert, job);
@@ -334,9 +346,9 @@ int run(ConvertCommandOptions options) {
   if (!common.quiet && !options.convert.max_error)
     expected = estimate_error(source, options.convert, job, summary.metadata.quantisation);
   display.reset();
-  print_warnings(summary.warnings);
+  print_warnings(common, summary.warnings);
   const std::optional<VoidCounts> voids = counts_of_voids(source, summary.source_voids);
-  StandardOutput out;
+  StandardOutput out(common);
   if (common.json) {
     out.write(json_text(document_of(options, summary, voids, expected)));
   } else if (!common.quiet) {
@@ -348,11 +360,27 @@ int run(ConvertCommandOptions options) {
 
 }  // namespace
 
-int command_convert(const Arguments& arguments) {
-  std::optional<ConvertCommandOptions> options = parse_convert(arguments);
-  if (!options) return kExitDone;
-  if (options->shard) return convert_shard_of(std::move(*options));
-  return options->each.each ? run_each(*options) : run(std::move(*options));
+Run add_convert(CLI::App& line, Common& common) {
+  const auto options = std::make_shared<ConvertCommandOptions>(ConvertCommandOptions{common});
+  positionals(line, "INPUT... OUTPUT.isohf",
+              "Rasters of elevations, joined into one surface: files, folders, \"patterns*\" and @LISTs, text files of "
+              "one input a line",
+              options->inputs.names)
+      ->required();
+  add_conversion_options(line, *options, common);
+  most_used(line, {"--output", "--overwrite", "--out-dir", "--crs", "--sample-spacing", "--z-scale", "--fill",
+                   "--max-error", "--lossless", "--memory"});
+  line.footer(kConvertFooter);
+  return [options, &line] {
+    complete(line, *options);
+    if (!options->out_dir.empty()) return run_each(*options);
+    if (options->output.empty()) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("no OUTPUT given: {} is an input; name an archive NAME.isohf, or give -o or --out-dir",
+                              options->inputs.names.back()));
+    }
+    return options->shard ? convert_shard_of(*options) : run(*options);
+  };
 }
 
 }  // namespace isohf::cli

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -9,8 +10,9 @@
 #include "isohf/parts.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
+#include "options/command_line.h"
 #include "options/describe.h"
-#include "options/options_common.h"
+#include "options/work_options.h"
 #include "output/json_output.h"
 #include "output/output_kinds.h"
 #include "output/restored_raster.h"
@@ -35,30 +37,13 @@ Examples:
   isohf diff old.isohf new.isohf --raster changes.tif  and where)";
 
 struct DiffCommand {
-  CommonOptions common;
-  WorkOptions work;
-  std::vector<std::string> archives;
+  const Common& common;
+  WorkOptions work{};
+  std::vector<std::string> archives = std::vector<std::string>(2);
   bool surface = false;
-  std::string raster;
+  std::string raster{};
   bool overwrite = false;
 };
-
-std::optional<DiffCommand> parse_diff(const Arguments& arguments) {
-  DiffCommand options;
-  CommandLine line("diff", "Compares two archives: metadata, tiles, and elevations if asked.");
-  line.group("Arguments");
-  line.positionals("FIRST SECOND", "The two archives", options.archives);
-  line.flag("--surface", "Decode the tiles that differ, and say how far their elevations lie apart", options.surface);
-  line.option("--raster", "RASTER",
-              "Write SECOND minus FIRST at the places of FIRST's source samples (.tif, .exr, ...)", options.raster);
-  line.flag("--overwrite", "Replace RASTER where it exists", options.overwrite);
-  add_threads_option(line, options.work.threads);
-  add_common_options(line, options.common);
-  line.footer(kDiffFooter);
-  if (!line.parse(arguments)) return std::nullopt;
-  if (options.archives.size() != 2) line.fail(fmt::format("found {} archives, must be two", options.archives.size()));
-  return options;
-}
 
 using nlohmann::ordered_json;
 
@@ -142,24 +127,36 @@ void write_difference(const DiffCommand& options, const Job& job) {
   sink->finish();
 }
 
-}  // namespace
-
-int command_diff(const Arguments& arguments) {
-  const auto options = parse_diff(arguments);
-  if (!options) return kExitDone;
-  for (const std::string& archive : options->archives) (void)open_archive(archive);
-  if (!options->raster.empty()) check_raster_output(options->archives, options->raster, options->overwrite);
-  std::optional<ProgressDisplay> display(std::in_place, options->work.progress, options->common.quiet,
-                                         options->common.verbose);
+int run(const DiffCommand& options) {
+  for (const std::string& archive : options.archives) (void)open_archive(archive);
+  if (!options.raster.empty()) check_raster_output(options.archives, options.raster, options.overwrite);
+  std::optional<ProgressDisplay> display(std::in_place, options.common, options.work.progress);
   const ArchiveDifference found =
-      diff_archives(options->archives[0], options->archives[1], options->surface, job_from(options->work, *display));
-  if (!options->raster.empty()) write_difference(*options, job_from(options->work, *display));
+      diff_archives(options.archives[0], options.archives[1], options.surface, job_from(options.work, *display));
+  if (!options.raster.empty()) write_difference(options, job_from(options.work, *display));
   display.reset();
-  StandardOutput out;
-  if (options->common.json) out.write(json_text(document_of(*options, found)));
-  if (!options->common.json && !options->common.quiet) out.write(text_from(*options, found));
+  StandardOutput out(options.common);
+  if (options.common.json) out.write(json_text(document_of(options, found)));
+  if (!options.common.json && !options.common.quiet) out.write(text_from(options, found));
   out.finish();
   return found.same_tiles() && found.metadata.empty() ? kExitDone : kExitDifferences;
+}
+
+}  // namespace
+
+Run add_diff(CLI::App& line, Common& common) {
+  const auto kept = std::make_shared<DiffCommand>(DiffCommand{common});
+  DiffCommand& options = *kept;
+  positional(line, "FIRST", "The first archive", options.archives[0]);
+  positional(line, "SECOND", "The second archive", options.archives[1]);
+  line.add_flag("--surface", options.surface,
+                "Decode the tiles that differ, and print how far their elevations differ");
+  option(line, "--raster", "RASTER",
+         "Write SECOND minus FIRST at the places of FIRST's source samples (.tif, .exr, ...)", options.raster);
+  line.add_flag("--overwrite", options.overwrite, "Replace RASTER if it exists");
+  add_threads_option(line, options.work.threads);
+  line.footer(kDiffFooter);
+  return [kept] { return run(*kept); };
 }
 
 }  // namespace isohf::cli

@@ -23,9 +23,10 @@
 #include "isohf/restore/sample_grids.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
+#include "options/command_line.h"
 #include "options/describe.h"
 #include "options/option_values.h"
-#include "options/options_common.h"
+#include "options/work_options.h"
 #include "output/json_output.h"
 #include "output/output_kinds.h"
 #include "output/restored_raster.h"
@@ -42,7 +43,7 @@ constexpr const char* kExportFooter =
     R"(Without options OUTPUT has the source's grid, reference system, sample type and scale, as far as its format
 holds them, whatever the archive was projected to. An archive made with --lossless gives the source's samples bit for
 bit, and their SHA-256 is checked. --like and --bbox keep the source's type and scale too. With any other grid,
---method, --z-scale or --z-offset the samples are elevations of the surface: float32 in .tif, .exr, .flt, .asc, .r32
+--method, --raw-scale or --raw-offset the samples are elevations of the surface: float32 in .tif, .exr, .flt, .asc, .r32
 and .npy, int16 in .hgt, and in .png, .r16 and .raw uint16 over the range of elevations, with scale and offset in
 OUTPUT.json. All tiles share one scale.
 With --tile-size OUTPUT is cut: NAME_x0_y0.r16 is the North-West tile, x counts East, y South. Without --size the
@@ -66,23 +67,24 @@ constexpr const char* kOwnMap = "none";
 constexpr std::int64_t kMostSide = std::int64_t{1} << 31U;
 
 struct ExportOptions {
-  CommonOptions common;
-  WorkOptions work;
-  std::string archive;
-  std::string output;
+  const Common& common;
+  WorkOptions work{};
+  std::string archive{};
+  std::string output{};
   bool overwrite = false;
-  std::string like;
-  std::optional<GridSize> size;
-  std::optional<LengthValue> spacing;
-  std::string system;  ///< a reference system, or "none"; empty: the source's
-  std::optional<BoundingBox> bbox;
-  std::optional<RestoreMethod> given_method;
-  std::optional<GridSize> tile_size;
+  std::string like{};
+  std::optional<GridSize> size{};
+  std::optional<LengthValue> spacing{};
+  std::string system{};  ///< a reference system, or "none"; empty: the source's
+  std::optional<BoundingBox> bbox{};
+  std::optional<RestoreMethod> given_method{};
+  std::optional<GridSize> tile_size{};
   std::int64_t overlap = 0;
-  std::optional<SampleType> type;
-  std::optional<double> z_scale;
-  std::optional<double> z_offset;
+  std::optional<SampleType> type{};
+  std::optional<double> raw_scale{};
+  std::optional<double> raw_offset{};
   bool clamp_range = false;
+  bool surface = false;
 
   [[nodiscard]] RestoreMethod method(const Metadata& metadata, const SampleGrid& grid) const {
     return given_method.value_or(usual_method(metadata, grid));
@@ -90,7 +92,7 @@ struct ExportOptions {
   [[nodiscard]] bool has_system() const { return !system.empty() && system != kOwnMap; }
   /// Whether the samples have the source's type and scale: its own all, and of a part those that the format holds.
   [[nodiscard]] bool as_source(const Metadata& metadata) const {
-    if (z_scale || z_offset) return false;
+    if (raw_scale || raw_offset) return false;
     const SampleType source = sample_type_from_string(metadata.source.sample_type);
     return !like.empty() || (is_on_sources_grid() && (!bbox || restored_type(output, source) == source));
   }
@@ -109,76 +111,6 @@ GridSize parse_side_or_size(const std::string& text) {
   if (text.find_first_of("xX") != std::string::npos) return parse_size(text, 1, kMostSide);
   const std::int64_t side = parse_whole_number(text, 1, kMostSide);
   return {side, side};
-}
-
-SampleType parse_type(const std::string& text) {
-  constexpr std::array<SampleType, 8> kTypes = {SampleType::kUint8,   SampleType::kUint16, SampleType::kInt16,
-                                                SampleType::kUint32,  SampleType::kInt32,  SampleType::kFloat16,
-                                                SampleType::kFloat32, SampleType::kFloat64};
-  return kTypes[parse_word(text, {"u8", "u16", "i16", "u32", "i32", "f16", "f32", "f64"})];
-}
-
-std::optional<ExportOptions> parse_export(const Arguments& arguments) {
-  ExportOptions options;
-  CommandLine line("export", "Writes an archive as a raster of elevations.");
-  line.group("Arguments");
-  line.positional("ARCHIVE", "Archive to read", options.archive);
-  line.positional("OUTPUT", "-o,--output",
-                  "Raster to write: NAME.tif, .exr, .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy", options.output);
-  line.flag("--overwrite", "Replace OUTPUT where it exists, and remove its tiles of another cut", options.overwrite);
-  line.group("Grid");
-  line.option("--like", "INPUT", "The grid of this raster, or of a folder, \"pattern*\" or @list of them",
-              options.like);
-  line.option("--size", "WxH", "Write so many samples over the source's ground (default: the source's samples)",
-              [&](const std::string& text) { options.size = parse_size(text, 1, kMostSide); });
-  line.option("--spacing", "LENGTH", "Write samples so far apart: world units, or with a unit as in 30m, 0.5km, 100ft",
-              [&](const std::string& text) { options.spacing = parse_length(text); });
-  line.option("--to-crs", "SYSTEM",
-              "Write the raster in this reference system: EPSG:2154, WKT, a PROJ string, a file with one of them, or "
-              "none for the archive's own map (default: the source's)",
-              [&](const std::string& text) { options.system = text == kOwnMap ? text : system_from(text); });
-  line.option("--bbox", "W,S,E,N",
-              "Only this part of the ground, in the source's coordinates; across the 180th meridian W is above E",
-              [&](const std::string& text) { options.bbox = bounding_box_from_string(text); });
-  line.option("--method", "NAME",
-              "hex, barycentric or average (default: see below; the source's own samples if they are kept)",
-              [&](const std::string& text) { options.given_method = restore_method_from_string(text); });
-  line.words({"hex", "barycentric", "average"});
-  line.group("Tiles");
-  line.option("--tile-size", "N|WxH", "Cut into tiles of so many samples, each into a file of its own",
-              [&](const std::string& text) { options.tile_size = parse_side_or_size(text); });
-  line.option("--overlap", "K", "Samples that neighbouring tiles share (default 0; 1 for shared edges)",
-              [&](const std::string& text) { options.overlap = parse_whole_number(text, 0, 65536); });
-  line.group("Samples");
-  line.option(
-      "--type", "TYPE",
-      "u8, u16, i16, u32, i32, f16, f32 or f64 (default: the source's, or float32, as far as the format holds it)",
-      [&](const std::string& text) { options.type = parse_type(text); });
-  line.option("--z-scale", "FACTOR", "elevation = sample * FACTOR + z-offset (default 1)",
-              [&](const std::string& text) { options.z_scale = parse_positive_number(text); });
-  line.option("--z-offset", "NUMBER", "See --z-scale (default 0)",
-              [&](const std::string& text) { options.z_offset = parse_number(text); });
-  line.flag("--clamp-range", "Move samples that the type does not hold to its ends, instead of refusing",
-            options.clamp_range);
-  add_work_options(line, options.work);
-  add_memory_option(line, options.work);
-  add_common_options(line, options.common);
-  line.footer(kExportFooter);
-  for (const char* option : {"--size", "--spacing", "--to-crs", "--bbox", "--tile-size"}) {
-    line.exclusive({"--like", option});
-  }
-  if (!line.parse(arguments)) return std::nullopt;
-  line.require("ARCHIVE", options.archive);
-  line.require("OUTPUT", options.output);
-  if (is_archive_name(options.output) && options.archive != options.output) {
-    throw Error(ErrorCode::kInvalidArgument,
-                options.output + ": OUTPUT has an archive's name; ARCHIVE comes first, OUTPUT last");
-  }
-  options.work.scratch_folder = scratch_folder_for(options.output);
-  if (options.overlap > 0 && !options.tile_size) {
-    throw Error(ErrorCode::kInvalidArgument, "export: --overlap needs --tile-size");
-  }
-  return options;
 }
 
 /// A system is named and spelled in many ways: the archive's, where the raster's is that.
@@ -205,7 +137,7 @@ SampleGrid grid_of_other(const ExportOptions& options, const Metadata& metadata)
   const SourceInfo other = in_words_of(metadata, like.source->info());
   std::vector<std::string> warnings;
   std::optional<SampleGrid> grid = grid_like(metadata, other, warnings);
-  for (const std::string& warning : warnings) print_warning(warning);
+  for (const std::string& warning : warnings) print_warning(options.common, warning);
   if (!grid) {
     const SourceFrame frame = make_source_frame(other);
     grid = {frame.width,
@@ -225,7 +157,7 @@ SampleGrid asked_grid_in_system(const ExportOptions& options, ArchiveReader& arc
                                 const std::optional<MapBounds>& box, bool quiet) {
   std::vector<Warning> warnings;
   auto system = understand_grid_system(archive, options.system, warnings);
-  if (!quiet) print_warnings(warnings);
+  if (!quiet) print_warnings(options.common, warnings);
   std::optional<double> spacing;
   if (options.spacing) {
     const Georeference& place = system->place;
@@ -332,10 +264,7 @@ ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
 class Exporter {
  public:
   Exporter(const ExportOptions& options, const ArchiveReader& archive, const ExportGrid& grid)
-      : options_(options),
-        archive_(archive),
-        grid_(grid),
-        display_(options.work.progress, options.common.quiet, options.common.verbose) {}
+      : options_(options), archive_(archive), grid_(grid), display_(options.common, options.work.progress) {}
 
   void run(bool is_lossless) { is_lossless ? run_lossless() : run_surface(); }
 
@@ -349,7 +278,7 @@ class Exporter {
  private:
   void run_lossless() {
     const SourceSamplesTarget target{options_.output, options_.type, options_.overwrite, scratch_of(options_.work)};
-    WrittenSamples samples = write_source_samples(archive_, target, job("export"));
+    WrittenSamples samples = write_source_samples(options_.common, archive_, target, job("export"));
     mapping = samples.mapping;
     written = std::move(samples.files);
     files = 1;
@@ -382,7 +311,7 @@ class Exporter {
       spec.scratch = scratch_of(options_.work);
       return spec;
     };
-    warn_of_losses(options_.output, spec_of(0, 0));
+    warn_of_losses(options_.common, options_.output, spec_of(0, 0));
     for (std::int64_t group = 0; group < tiles.groups(); ++group) {
       tiles.begin_group(group, spec_of);
       counts = {};
@@ -400,6 +329,7 @@ class Exporter {
     if (counts.clamped == 0 || options_.clamp_range) return;
     display_.clear();
     print_warning(
+        options_.common,
         fmt::format("{}: the surface overshoots the {} of its source at {} samples; they were moved to its ends",
                     options_.output, to_string(mapping.type), describe_count(counts.clamped)));
   }
@@ -423,7 +353,7 @@ class Exporter {
   [[nodiscard]] std::string remedy() const {
     const Metadata& metadata = archive_.metadata();
     const std::string& output = options_.output;
-    if (options_.z_scale || options_.z_offset) {
+    if (options_.raw_scale || options_.raw_offset) {
       const std::string scale = scale_that_holds(metadata.statistics, mapping, has_voids);
       if (!scale.empty())
         return usual_remedy(output, mapping, metadata.statistics, RestoreMethod::kBarycentric) + ", " + scale;
@@ -438,24 +368,25 @@ class Exporter {
     const Metadata& metadata = archive_.metadata();
     const SampleMapping found{options_.written_type(metadata), metadata.source.z_scale, metadata.source.z_offset};
     if (found.type == SampleType::kFloat16 && sample_type_from_string(metadata.source.sample_type) != found.type) {
-      warn_of_halves(options_.output, metadata);
+      warn_of_halves(options_.common, options_.output, metadata);
     }
     if (!takes_decimals(metadata, found)) return found;
     if (has_scale(options_.output)) return spread_over_range(found.type);
-    warn_of_whole_numbers(options_.output, metadata);
+    warn_of_whole_numbers(options_.common, options_.output, metadata);
     return found;
   }
 
   SampleMapping choose_mapping() {
     if (options_.as_source(archive_.metadata())) return source_mapping();
     const SampleType type = options_.written_type(archive_.metadata());
-    if (options_.z_scale || options_.z_offset) {
-      return {type, options_.z_scale.value_or(1.0), options_.z_offset.value_or(0.0)};
+    if (options_.raw_scale || options_.raw_offset) {
+      return {type, options_.raw_scale.value_or(1.0), options_.raw_offset.value_or(0.0)};
     }
-    if (type == SampleType::kFloat16) warn_of_halves(options_.output, archive_.metadata());
+    if (type == SampleType::kFloat16) warn_of_halves(options_.common, options_.output, archive_.metadata());
     if (type == SampleType::kUint8 || type == SampleType::kUint16) return spread_over_range(type);
     const SampleMapping whole{type, 1.0, 0.0};
-    if (takes_decimals(archive_.metadata(), whole)) warn_of_whole_numbers(options_.output, archive_.metadata());
+    if (takes_decimals(archive_.metadata(), whole))
+      warn_of_whole_numbers(options_.common, options_.output, archive_.metadata());
     return whole;
   }
 
@@ -485,8 +416,8 @@ int run(const ExportOptions& options) {
   }
   ArchiveReader archive = open_with_source(options.archive);
   const Metadata& metadata = archive.metadata();
-  const bool is_lossless =
-      options.is_on_sources_grid() && !options.bbox && options.as_source(metadata) && lossless_record(metadata);
+  const bool is_lossless = options.is_on_sources_grid() && !options.bbox && !options.surface &&
+                           options.as_source(metadata) && lossless_record(metadata);
   ExportGrid grid;
   if (is_lossless) {
     const SampleGrid source = source_grid(metadata.source);
@@ -517,12 +448,13 @@ int run(const ExportOptions& options) {
   const SampleMapping& mapping = exporter.mapping;
   const RestoreMethod method = options.method(metadata, samples);
   if (exporter.counts.nodata > 0 && raster_kind(options.output) == RasterKind::kRaw16) {
-    print_warning(fmt::format(
-        "{}: {} voids are written as {}, which an engine takes for a height; `convert --fill` "
-        "closes voids",
-        options.output, describe_count(exporter.counts.nodata), void_value_of(mapping.type, true).value_or(0.0)));
+    print_warning(options.common,
+                  fmt::format("{}: {} voids are written as {}, which an engine takes for a height; `convert --fill` "
+                              "closes voids",
+                              options.output, describe_count(exporter.counts.nodata),
+                              void_value_of(mapping.type, true).value_or(0.0)));
   }
-  StandardOutput out;
+  StandardOutput out(options.common);
   if (options.common.json) {
     out.write(json_text({{"archive", options.archive},
                          {"output", options.output},
@@ -579,9 +511,69 @@ int run(const ExportOptions& options) {
 
 }  // namespace
 
-int command_export(const Arguments& arguments) {
-  const std::optional<ExportOptions> options = parse_export(arguments);
-  return options ? run(*options) : static_cast<int>(kExitDone);
+Run add_export(CLI::App& line, Common& common) {
+  const auto kept = std::make_shared<ExportOptions>(ExportOptions{common});
+  ExportOptions& options = *kept;
+  positional(line, "ARCHIVE", "Archive to read", options.archive);
+  positional(line, "OUTPUT,-o,--output",
+             "Raster to write: .tif, .exr, .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy", options.output);
+  line.add_flag("--overwrite", options.overwrite, "Replace OUTPUT if it exists, and remove its tiles of another cut");
+  group(line, "Grid");
+  option(line, "--like", "INPUT", "The grid of this raster, or of a folder, \"pattern*\" or @list of them",
+         options.like);
+  option(line, "--size", "WxH", "Samples over the source's extent [default: the source's]",
+         [&options](const std::string& text) { options.size = parse_size(text, 1, kMostSide); });
+  option(line, "--spacing", "LENGTH", "Distance between samples: world units, or with a unit as in 30m, 0.5km, 100ft",
+         [&options](const std::string& text) { options.spacing = parse_length(text); });
+  option(
+      line, "--to-crs", "SYSTEM",
+      "Reference system of the raster: EPSG:2154, WKT, a PROJ string, a file containing one, or none for the archive's "
+      "own map [default: the source's]",
+      [&options](const std::string& text) { options.system = text == kOwnMap ? text : system_from(text); });
+  option(line, "--bbox", "W,S,E,N",
+         "Only this part, in the source's coordinates; across the 180th meridian W is above E",
+         [&options](const std::string& text) { options.bbox = bounding_box_from_string(text); });
+  option(line, "--method", "hex|barycentric|average", "Interpolation [default: see below]",
+         [&options](const std::string& text) { options.given_method = restore_method_from_string(text); });
+  group(line, "Tiles");
+  CLI::Option* const tiles =
+      option(line, "--tile-size", "N|WxH", "Cut into tiles of this many samples, a file each",
+             [&options](const std::string& text) { options.tile_size = parse_side_or_size(text); });
+  option(line, "--overlap", "K", "Samples that neighbouring tiles share [default: 0; 1 for shared edges]",
+         [&options](const std::string& text) { options.overlap = parse_whole_number(text, 0, 65536); })
+      ->needs(tiles);
+  group(line, "Samples");
+  choice<SampleType>(line, "--type",
+                     {{"u8", SampleType::kUint8},
+                      {"u16", SampleType::kUint16},
+                      {"i16", SampleType::kInt16},
+                      {"u32", SampleType::kUint32},
+                      {"i32", SampleType::kInt32},
+                      {"f16", SampleType::kFloat16},
+                      {"f32", SampleType::kFloat32},
+                      {"f64", SampleType::kFloat64}},
+                     "Sample type [default: the source's, or f32, as far as the format holds it]", options.type);
+  option(line, "--raw-scale", "FACTOR", "elevation = stored number x FACTOR + --raw-offset [default: 1]",
+         [&options](const std::string& text) { options.raw_scale = parse_positive_number(text); });
+  option(line, "--raw-offset", "NUMBER", "See --raw-scale [default: 0]",
+         [&options](const std::string& text) { options.raw_offset = parse_number(text); });
+  line.add_flag("--clamp-range", options.clamp_range, "Clamp samples that the type does not hold, instead of failing");
+  line.add_flag("--surface", options.surface, "Write the surface, also where --lossless kept the source's samples");
+  for (const char* rival : {"--size", "--spacing", "--to-crs", "--bbox", "--tile-size"})
+    exclusive(line, {"--like", rival});
+  add_work_options(line, options.work, common);
+  add_memory_option(line, options.work);
+  most_used(line, {"--overwrite", "--like", "--size", "--spacing", "--to-crs", "--bbox", "--tile-size", "--overlap",
+                   "--type", "--raw-scale"});
+  line.footer(kExportFooter);
+  return [kept] {
+    if (is_archive_name(kept->output) && kept->archive != kept->output) {
+      throw Error(ErrorCode::kInvalidArgument,
+                  kept->output + ": OUTPUT has an archive's name; ARCHIVE comes first, OUTPUT last");
+    }
+    kept->work.scratch_folder = scratch_folder_for(kept->output);
+    return run(*kept);
+  };
 }
 
 }  // namespace isohf::cli

@@ -11,7 +11,6 @@
 #include "formats/registry.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/error.h"
-#include "options/options_common.h"
 #include "output/json_output.h"
 #include "output/standard_output.h"
 
@@ -22,7 +21,7 @@ using nlohmann::ordered_json;
 
 constexpr const char* kFormatsFooter =
     R"(Inputs are recognised by their first bytes; the extension decides only where a format has no signature.
-Every input takes --registration, --nodata, --valid-range, --fill, --fill-distance, --z-scale, --z-offset and
+Every input takes --registration, --nodata, --valid-range, --fill, --z-scale, --z-offset and
 --sample-spacing.
 
 Examples:
@@ -80,16 +79,9 @@ std::string text_from(const OtherFormats& other) {
                      fmt::join(other.formats->extensions, " "));
 }
 
-}  // namespace
-
-int command_formats(const Arguments& arguments) {
-  CommonOptions common;
-  CommandLine line("formats", "Lists the formats that are read and written, and the libraries that do it.");
-  add_common_options(line, common);
-  line.footer(kFormatsFooter);
-  if (!line.parse(arguments)) return kExitDone;
+int run(const Common& common) {
   const OtherFormats other = other_formats();
-  StandardOutput out;
+  StandardOutput out(common);
   if (common.json) {
     out.write(json_text({{"read", list_of(native_formats())},
                          {"read_by_module", list_of(other)},
@@ -99,6 +91,13 @@ int command_formats(const Arguments& arguments) {
   }
   out.finish();
   return kExitDone;
+}
+
+}  // namespace
+
+Run add_formats(CLI::App& line, Common& common) {
+  line.footer(kFormatsFooter);
+  return [&common] { return run(common); };
 }
 
 }  // namespace isohf::cli

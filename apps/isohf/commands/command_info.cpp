@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -25,8 +26,8 @@
 #include "isohf/raster.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
+#include "options/command_line.h"
 #include "options/describe.h"
-#include "options/options_common.h"
 #include "output/accuracy_output.h"
 #include "output/json_output.h"
 #include "output/raster_info.h"
@@ -48,33 +49,13 @@ Examples:
   isohf info dem.isohf --json         the metadata and what follows from it)";
 
 struct InfoOptions {
-  CommonOptions common;
-  std::vector<std::string> inputs;
+  const Common& common;
+  std::vector<std::string> inputs{};
   bool tiles = false;
-  OpenOptions open;
+  OpenOptions open{};
   bool stats = false;
-  std::string for_rasters;  ///< an option given that only rasters take
+  std::string for_rasters{};  ///< an option given that only rasters take
 };
-
-std::optional<InfoOptions> parse_info(const Arguments& arguments) {
-  InfoOptions options;
-  CommandLine line("info", "Describes archives and rasters.");
-  line.group("Arguments");
-  line.positionals("INPUT...",
-                   "Archives and rasters to describe, one after the other: files, folders, \"patterns*\" and @lists",
-                   options.inputs);
-  line.flag("--tiles", "List an archive's tiles", options.tiles);
-  line.flag("--stats", "Read all samples of a raster: range, mean, voids", options.stats);
-  line.group("Input");
-  add_part_options(line, options.open);
-  add_raw_option(line, options.open);
-  add_common_options(line, options.common);
-  line.footer(kInfoFooter);
-  if (!line.parse(arguments)) return std::nullopt;
-  line.require("INPUT", options.inputs);
-  options.for_rasters = line.given("--stats") ? "--stats" : line.first_given({"Input"});
-  return options;
-}
 
 /// The elevation that the index's code stands for.
 double elevation_of(const Quantisation& quantisation, std::uint32_t code) {
@@ -116,7 +97,7 @@ ordered_json json_from_tiles(const ArchiveReader& archive) {
   return tiles;
 }
 
-void print_json(const ArchiveReader& archive, bool tiles, bool is_one_of_many) {
+void print_json(const InfoOptions& options, const ArchiveReader& archive, bool is_one_of_many) {
   const Derived derived = derive(archive);
   const SizeBesideSource size(archive.metadata(), derived.tile_bytes);
   ordered_json members = ordered_json::array();
@@ -149,12 +130,12 @@ void print_json(const ArchiveReader& archive, bool tiles, bool is_one_of_many) {
       {"bits_per_source_sample", size.bits_per_source_sample},
       {"ratio_to_source", size.ratio_to_source},
       {"reads_by_directory", archive.reads_by_directory()},
-      {"warnings", archive.warnings()},
+      {"warnings", json_from(archive.warnings())},
       {"tables", tables},
       {"members", members}};
   add_source_place(source_place(archive.metadata()), document);
-  if (tiles) document["tiles"] = json_from_tiles(archive);
-  StandardOutput out;
+  if (options.tiles) document["tiles"] = json_from_tiles(archive);
+  StandardOutput out(options.common);
   out.write(is_one_of_many ? json_line(document) : json_text(document));
   out.finish();
 }
@@ -336,22 +317,21 @@ void print_tiles(const ArchiveReader& archive, StandardOutput& out) {
 int describe_one(const InfoOptions& options, const std::string& input, bool is_one_of_many) {
   if (!is_archive(input, options.open)) {
     if (options.tiles) {
-      throw Error(ErrorCode::kInvalidArgument, "info: --tiles is for archives, " + input + " is none");
+      throw Error(ErrorCode::kInvalidArgument, "--tiles is for archives, " + input + " is none");
     }
     print_raster_info(input, options.open, options.stats, options.common, is_one_of_many);
     return kExitDone;
   }
   if (!options.for_rasters.empty()) {
-    throw Error(ErrorCode::kInvalidArgument,
-                "info: " + options.for_rasters + " is for rasters, " + input + " is an archive");
+    throw Error(ErrorCode::kInvalidArgument, options.for_rasters + " is for rasters, " + input + " is an archive");
   }
   const ArchiveReader archive = open_archive(input, ArchiveReader::Shards::kRead);
-  print_warnings(archive.warnings());
+  print_warnings(options.common, archive.warnings());
   if (options.common.json) {
-    print_json(archive, options.tiles, is_one_of_many);
+    print_json(options, archive, is_one_of_many);
     return kExitDone;
   }
-  StandardOutput out;
+  StandardOutput out(options.common);
   if (!options.common.quiet) {
     if (options.tiles) {
       print_tiles(archive, out);
@@ -367,9 +347,9 @@ int run(const InfoOptions& options) {
   const std::vector<std::string> files = list_files(options.inputs, false);
   const bool in_blocks = files.size() > 1 && !options.common.json && !options.common.quiet;
   bool is_first = true;
-  return for_each_file("info", files, options.common, [&](const std::string& file) {
+  return for_each_file(files, options.common, [&](const std::string& file) {
     if (in_blocks && !std::exchange(is_first, false)) {
-      StandardOutput out;
+      StandardOutput out(options.common);
       out.write("\n");
       out.finish();
     }
@@ -379,9 +359,22 @@ int run(const InfoOptions& options) {
 
 }  // namespace
 
-int command_info(const Arguments& arguments) {
-  const std::optional<InfoOptions> options = parse_info(arguments);
-  return options ? run(*options) : static_cast<int>(kExitDone);
+Run add_info(CLI::App& line, Common& common) {
+  const auto kept = std::make_shared<InfoOptions>(InfoOptions{common});
+  InfoOptions& options = *kept;
+  positionals(line, "INPUT...", "Archives and rasters to describe: files, folders, \"patterns*\" and @lists",
+              options.inputs)
+      ->required();
+  line.add_flag("--tiles", options.tiles, "List an archive's tiles");
+  line.add_flag("--stats", options.stats, "Read all samples of a raster: range, mean, nodata");
+  group(line, "Input");
+  add_part_options(line, options.open);
+  add_raw_option(line, options.open);
+  line.footer(kInfoFooter);
+  return [kept, &line] {
+    kept->for_rasters = kept->stats ? "--stats" : first_given(line, {"Input"});
+    return run(*kept);
+  };
 }
 
 }  // namespace isohf::cli

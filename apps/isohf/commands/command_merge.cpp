@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "commands/command.h"
 #include "isohf/shards.h"
-#include "options/options_common.h"
+#include "options/command_line.h"
+#include "options/work_options.h"
 #include "output/json_output.h"
 #include "output/output_kinds.h"
 #include "output/part_output.h"
@@ -25,38 +26,20 @@ Examples:
   isohf merge part-*.isohf --missing         which shards are to be made (again))";
 
 struct MergeCommand {
-  CommonOptions common;
-  WorkOptions work;
-  std::vector<std::string> shards;
-  std::string output;
+  const Common& common;
+  WorkOptions work{};
+  std::vector<std::string> shards{};
+  std::string output{};
   bool missing = false;
   bool overwrite = false;
 };
 
-std::optional<MergeCommand> parse_merge(const Arguments& arguments) {
-  MergeCommand options;
-  CommandLine line("merge", "Joins the shards of a conversion to its archive.");
-  line.group("Arguments");
-  line.positionals("SHARD...", "Shards of isohf convert --shard, in any order", options.shards);
-  line.option("-o,--output", "OUTPUT", "Archive to write", options.output);
-  line.flag("--overwrite", "Replace OUTPUT where it exists", options.overwrite);
-  line.flag("--missing", "Print the numbers of the shards that are missing or damaged, and write nothing",
-            options.missing);
-  add_work_options(line, options.work);
-  add_common_options(line, options.common);
-  line.footer(kMergeFooter);
-  if (!line.parse(arguments)) return std::nullopt;
-  line.require("SHARD", options.shards);
-  if (!options.missing) line.require("OUTPUT (-o)", options.output);
-  return options;
-}
-
 /// An empty line if none is missing.
 int print_missing(const MergeCommand& options) {
-  ProgressDisplay display(options.work.progress, options.common.quiet, options.common.verbose);
+  ProgressDisplay display(options.common, options.work.progress);
   const MissingShards missing = missing_shards(options.shards, job_from(options.work, display));
   display.clear();
-  StandardOutput out;
+  StandardOutput out(options.common);
   if (options.common.json) {
     out.write(json_text({{"shards", missing.count}, {"missing", missing.numbers}}));
   } else {
@@ -66,16 +49,27 @@ int print_missing(const MergeCommand& options) {
   return kExitDone;
 }
 
+int run(const MergeCommand& options) {
+  if (options.missing) return print_missing(options);
+  if (options.output.empty()) throw Error(ErrorCode::kInvalidArgument, "no OUTPUT given (-o), nor --missing");
+  check_archive_output(options.shards, options.output, options.overwrite);
+  return print_part(options.output, options.common, options.work, [&](const Job& job) {
+    return merge_shards(options.shards, options.output, {options.overwrite, options.common.strict}, job);
+  });
+}
+
 }  // namespace
 
-int command_merge(const Arguments& arguments) {
-  const auto options = parse_merge(arguments);
-  if (!options) return kExitDone;
-  if (options->missing) return print_missing(*options);
-  check_archive_output(options->shards, options->output, options->overwrite);
-  return print_part(options->output, options->common, options->work, [&](const Job& job) {
-    return merge_shards(options->shards, options->output, {options->overwrite, options->common.strict}, job);
-  });
+Run add_merge(CLI::App& line, Common& common) {
+  const auto options = std::make_shared<MergeCommand>(MergeCommand{common});
+  positionals(line, "SHARD...", "Shards of isohf convert --shard, in any order", options->shards)->required();
+  option(line, "-o,--output", "OUTPUT", "Archive to write", options->output);
+  line.add_flag("--overwrite", options->overwrite, "Replace OUTPUT if it exists");
+  line.add_flag("--missing", options->missing,
+                "Print the numbers of the shards that are missing or damaged, and write nothing");
+  add_work_options(line, options->work, common);
+  line.footer(kMergeFooter);
+  return [options] { return run(*options); };
 }
 
 }  // namespace isohf::cli

@@ -6,16 +6,13 @@
 #include <optional>
 
 #include "commands/command.h"
+#include "input/convert_setup.h"
 #include "input/input_files.h"
-#include "input/options_ground.h"
-#include "input/options_lattice.h"
-#include "input/options_source.h"
-#include "input/source_inputs.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "options/command_line.h"
 #include "options/describe.h"
-#include "options/option_values.h"
-#include "options/options_common.h"
+#include "options/work_options.h"
 #include "output/json_output.h"
 #include "output/plan_report.h"
 #include "output/standard_output.h"
@@ -26,55 +23,14 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kPlanFooter =
-    R"(Without INPUT the candidates for a tile are listed, best true aspect first: (R-3)sin60/(C-4), 1 is
-equilateral. With INPUT nothing is written; sizes are estimates.
+    R"(Takes every option of convert and writes nothing; sizes are estimates. Without INPUT the candidates for a tile are listed,
+best true aspect first: (R-3)sin60/(C-4), 1 is equilateral.
 
 Examples:
   isohf plan --levels 4 --shape 10000
   isohf plan --shape 212x243
   isohf plan dem.tif --density 0.866
   isohf plan tiles/                   what many rasters make together)";
-
-struct PlanOptions {
-  CommonOptions common;
-  WorkOptions work;
-  SourceInputs inputs;
-  OpenOptions open;
-
-  PlanRequest request;
-  GeoidRequest geoid;
-  CodeType code_type = CodeType::kU16;
-  bool spacing_in_metres = false;
-};
-
-std::optional<PlanOptions> parse_plan(const Arguments& arguments) {
-  PlanOptions options;
-  CommandLine line("plan", "Lists tile shapes, or previews a conversion.");
-  line.group("Arguments");
-  line.positionals("[INPUT...]",
-                   "Rasters of elevations: files, folders, \"patterns*\" and @lists, which form one source (default: "
-                   "none, list shapes)",
-                   options.inputs.names);
-  add_shape_options(line, options.request);
-  line.group("Candidates");
-  add_code_type_option(line, options.code_type);
-  add_lattice_options(line, options.request, options.spacing_in_metres);
-  add_ground_options(line, options.request.ground);
-  add_geoid_option(line, options.geoid);
-  add_source_options(line, options.open);
-  add_mosaic_options(line, options.inputs);
-  add_threads_option(line, options.work.threads);
-  add_memory_option(line, options.work);
-  add_common_options(line, options.common);
-  line.footer(kPlanFooter);
-  if (!line.parse(arguments)) return std::nullopt;
-  const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, "plan: " + why); };
-  if (options.inputs.names.empty()) {
-    const std::string option = line.first_given({"Lattice", "Ground", "Input", "Several inputs", "Work"});
-    if (!option.empty()) refuse(option + " needs an INPUT");
-  }
-  return options;
-}
 
 std::int64_t stitch_indices_of_all_levels(const TileShape& shape) {
   std::int64_t count = 0;
@@ -109,63 +65,67 @@ ordered_json json_with_bytes(const TileShape& shape, CodeType type) {
   return json;
 }
 
-std::vector<TileShape> shapes_for(const PlanOptions& options) {
+std::vector<TileShape> shapes_for(const PlanRequest& request) {
   constexpr int kDefaultLevels = 4;
   constexpr int kMostCandidates = 10;
-  const PlanRequest& request = options.request;
   const int levels = request.levels.value_or(kDefaultLevels);
   if (request.shape) return {TileShape::make(request.shape->first, request.shape->second, levels)};
   std::vector<TileShape> shapes = candidate_shapes(request, kMostCandidates);
   if (shapes.empty()) {
     throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("plan: no tile shape of {} levels lies near {}; ask for more of them or for fewer --levels",
-                            levels, request.budget ? request.budget->count : 0));
+                fmt::format("no tile shape of {} levels is near {}; request more triangles or fewer --levels", levels,
+                            request.budget ? request.budget->count : 0));
   }
   return shapes;
 }
 
-void list_candidates(const PlanOptions& options) {
-  const std::vector<TileShape> shapes = shapes_for(options);
-  StandardOutput out;
+int list_candidates(const ConvertCommandOptions& options) {
+  const CodeType type = options.convert.code_type;
+  const std::vector<TileShape> shapes = shapes_for(options.convert.plan);
+  StandardOutput out(options.common);
   if (options.common.json) {
     ordered_json list = ordered_json::array();
-    for (const TileShape& shape : shapes) list.push_back(json_with_bytes(shape, options.code_type));
-    out.write(json_text({{"code_type", to_string(options.code_type)}, {"candidates", list}}));
+    for (const TileShape& shape : shapes) list.push_back(json_with_bytes(shape, type));
+    out.write(json_text({{"code_type", to_string(type)}, {"candidates", list}}));
   } else {
     std::string text = std::string(kTableHeading) + "\n";
-    for (const TileShape& shape : shapes) text += table_row(shape, options.code_type) + "\n";
+    for (const TileShape& shape : shapes) text += table_row(shape, type) + "\n";
     out.write(text + kTableNotes);
   }
   out.finish();
+  return kExitDone;
 }
 
-int run(const PlanOptions& options) {
-  if (options.inputs.names.empty()) {
-    list_candidates(options);
-  } else {
-    SourceInputs inputs = options.inputs;
-    inputs.onto = options.request.ground.projection;
-    OpenedInputs opened =
-        open_inputs(expand_inputs(inputs.names, inputs.recursive), inputs, options.open, options.work);
-    ConvertOptions convert;
-    convert.plan = options.request;
-    if (opened.is_reprojected) convert.plan.ground.projection = ProjectionRequest{};
-    const std::unique_ptr<HeightSource> source =
-        laid_out(std::move(opened.source), options.geoid, convert.plan.ground, false);
-    understand_ground(source->info(), convert.plan.ground);
-    convert.code_type = options.code_type;
-    convert.source_note = opened.note;
-    check_spacing_unit(source->info(), convert.plan, options.spacing_in_metres);
-    print_plan(*source, convert, job_from(options.work), options.common);
+int preview(ConvertCommandOptions& options) {
+  if (options.convert.max_error) {
+    throw Error(ErrorCode::kInvalidArgument, "what --max-error chooses is found by converting; leave it out");
   }
+  const Prepared prepared = prepare(options, expand_inputs(options.inputs.names, options.inputs.recursive));
+  print_plan(*prepared.source, options.convert, job_from(options.work), options.common);
   return kExitDone;
 }
 
 }  // namespace
 
-int command_plan(const Arguments& arguments) {
-  const std::optional<PlanOptions> options = parse_plan(arguments);
-  return options ? run(*options) : static_cast<int>(kExitDone);
+Run add_plan(CLI::App& line, Common& common) {
+  const auto options = std::make_shared<ConvertCommandOptions>(ConvertCommandOptions{common});
+  positionals(line, "[INPUT...] [OUTPUT.isohf]", "As for convert; without INPUT, tile shapes are listed",
+              options->inputs.names);
+  add_conversion_options(line, *options, common);
+  most_used(line, {"--shape", "--levels", "--density", "--spacing", "--crs", "--to-crs", "--type", "--memory"});
+  line.footer(kPlanFooter);
+  return [options, &line] {
+    if (options->inputs.names.empty()) {
+      for (const CLI::Option* option : line.get_options()) {
+        const std::string name = long_name(*option);
+        if (option->count() == 0 || name == "--shape" || name == "--levels" || name == "--type") continue;
+        throw Error(ErrorCode::kInvalidArgument, name + " needs an INPUT");
+      }
+      return list_candidates(*options);
+    }
+    complete(line, *options);
+    return preview(*options);
+  };
 }
 
 }  // namespace isohf::cli

@@ -14,14 +14,15 @@
 
 #include "commands/command.h"
 #include "commands/line_reader.h"
-#include "input/quantities.h"
 #include "isohf/archive.h"
 #include "isohf/error.h"
 #include "isohf/projection/other_reading.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
+#include "options/command_line.h"
 #include "options/option_values.h"
-#include "options/options_common.h"
+#include "options/sun_options.h"
+#include "options/work_options.h"
 #include "output/json_output.h"
 #include "output/standard_output.h"
 #include "work_arena.h"
@@ -47,24 +48,26 @@ sun that is seen, 0 to 1, from the surface or from --above it. Nothing is swept:
 each triangle.
 
 Examples:
-  isohf sample dem.isohf --at 1200.5 340
-  isohf sample dem.isohf --at-lonlat 6.865 45.833
-  isohf sample dem.isohf --at-crs 334000 5077500 --with-lonlat      in metres of the input's own map
+  isohf sample dem.isohf --at 1200.5,340
+  isohf sample dem.isohf --at 6.865,45.833 --in lonlat
+  isohf sample dem.isohf --at 334000,5077500 --in crs --with lonlat
   isohf sample dem.isohf < places.txt > elevations.txt
-  isohf sample dem.isohf --at 1200.5 340 --shadow --azimuth 120 --sun-elevation 8 --above 30    a roof)";
+  isohf sample dem.isohf --at 1200.5,340 --shadow --sun 120,8 --above 30    a roof)";
+
+/// What numbers of places are.
+enum class PlaceKind : std::uint8_t { kWorld, kSource, kGeo };
 
 struct SampleOptions {
-  CommonOptions common;
-  std::string archive;
-  std::vector<WorldPoint> places;
-  std::vector<GeoPoint> geo_places;
-  std::vector<MapPoint> source_places;
-  bool reads_degrees = false;  ///< standard input holds longitudes and latitudes
-  bool reads_source = false;   ///< standard input holds coordinates of the source
-  bool with_degrees = false;   ///< answers hold them
+  const Common& common;
+  std::string archive{};
+  std::vector<MapPoint> places{};  ///< of --at
+  PlaceKind in = PlaceKind::kWorld;
+  bool with_degrees = false;  ///< answers hold them
   bool with_source = false;
   bool with_shadow = false;
-  Sun sun;
+  Sun sun{};
+  SunPlace sun_place = kUsualSun;
+  std::optional<SolarTime> date{};
   double above = 0.0;
   int threads = 0;
 };
@@ -73,48 +76,6 @@ double parse_height(const std::string& text) {
   const double height = parse_number(text);
   if (height >= 0.0) return height;
   throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be 0 or more");
-}
-
-std::optional<SampleOptions> parse_sample(const Arguments& arguments) {
-  SampleOptions options;
-  CommandLine line("sample", "Prints elevation and normal at places read from standard input.");
-  line.group("Arguments");
-  line.positional("ARCHIVE", "Archive to sample", options.archive);
-  line.repeated_pair("--at", "X Z", "A place, instead of standard input; may be given again",
-                     [&](const std::string& x, const std::string& z) {
-                       options.places.push_back({parse_number(x), parse_number(z)});
-                     });
-  line.repeated_pair("--at-lonlat", "LON LAT", "A place in degrees of the input's own datum; may be given again",
-                     [&](const std::string& longitude, const std::string& latitude) {
-                       options.geo_places.push_back({parse_number(longitude), parse_number(latitude)});
-                     });
-  line.repeated_pair("--at-crs", "E N", "A place in the input's own coordinates; may be given again",
-                     [&](const std::string& easting, const std::string& northing) {
-                       options.source_places.push_back({parse_number(easting), parse_number(northing)});
-                     });
-  line.flag("--lonlat", "Places on standard input are longitude and latitude, degrees", options.reads_degrees);
-  line.flag("--crs", "Places on standard input are in the input's own coordinates", options.reads_source);
-  line.flag("--with-lonlat", "Add longitude and latitude to each line", options.with_degrees);
-  line.flag("--with-crs", "Add the input's own coordinates to each line", options.with_source);
-  line.exclusive({"--at", "--at-lonlat", "--at-crs", "--lonlat", "--crs"});
-  line.group("Shadow");
-  line.flag("--shadow", "Add the shadow's elevation and the share of the sun that is seen", options.with_shadow);
-  line.option("--azimuth", "DEG", "Where the sun stands, clockwise from North; N, E, S or W (default 270)",
-              [&](const std::string& text) { options.sun.azimuth_deg = parse_azimuth(text); });
-  line.option("--sun-elevation", "DEG", "Height of the sun above the horizon, 0.01 to 90 (default 15)",
-              [&](const std::string& text) { options.sun.elevation_deg = parse_altitude(text); });
-  line.option("--above", "H", "Height above the surface that the sun is seen from, vertical units (default 0)",
-              [&](const std::string& text) { options.above = parse_height(text); });
-  add_threads_option(line, options.threads);
-  add_common_options(line, options.common);
-  line.footer(kSampleFooter);
-  if (!line.parse(arguments)) return std::nullopt;
-  line.require("ARCHIVE", options.archive);
-  for (const char* option : {"--azimuth", "--sun-elevation", "--above"}) {
-    if (!options.with_shadow && line.given(option))
-      line.fail(std::string(option) + " is for --shadow, which is not given");
-  }
-  return options;
 }
 
 /// Reads "x z" or "x,z"; false where the text is neither.
@@ -193,9 +154,6 @@ std::string line_of(const SurfaceSample& sample, const SunSample* sun, WorldPoin
   return json_line(json);
 }
 
-/// The kinds of numbers that name places.
-enum class PlaceKind : std::uint8_t { kWorld, kSource, kGeo };
-
 /// Recognises places that lie outside because their numbers are swapped, or of another kind.
 class PlaceHints {
  public:
@@ -213,11 +171,11 @@ class PlaceHints {
     const MapBounds place{typed.easting, typed.northing, typed.easting, typed.northing};
     const auto other = other_reading(place, covered_, readings_);
     if (!other) return;
-    constexpr const char* kOptions[] = {"--at", "--at-crs", "--at-lonlat"};
-    const char* const option = kOptions[static_cast<std::size_t>(kinds_[other->index])];
-    hint_ = fmt::format("{:.10g} {:.10g} lies outside; read as {} it lies inside: {} {:.10g} {:.10g}", typed.easting,
-                        typed.northing, other->words, option, other->is_swapped ? typed.northing : typed.easting,
-                        other->is_swapped ? typed.easting : typed.northing);
+    constexpr const char* kWords[] = {"world", "crs", "lonlat"};
+    const char* const in = kWords[static_cast<std::size_t>(kinds_[other->index])];
+    hint_ = fmt::format("{:.10g},{:.10g} lies outside; read as {} it lies inside: --at {:.10g},{:.10g} --in {}",
+                        typed.easting, typed.northing, other->words, other->is_swapped ? typed.northing : typed.easting,
+                        other->is_swapped ? typed.easting : typed.northing, in);
   }
   /// Of the first place that was recognised; empty where none was.
   [[nodiscard]] const std::string& hint() const { return hint_; }
@@ -310,13 +268,13 @@ class Answers {
   const SampleOptions& options_;
   const PlaceOutput& output_;
   Surface surface_;
-  StandardOutput out_;
+  StandardOutput out_{options_.common};
   std::vector<WorldPoint> places_;
 };
 
 /// Every place on standard input: x and z, or longitude and latitude.
-void read_places(Answers& answers, const std::function<void(MapPoint)>& take) {
-  LineReader reader;
+void read_places(const Common& common, Answers& answers, const std::function<void(MapPoint)>& take) {
+  LineReader reader(common.in);
   const auto flush = [&] { answers.flush(); };
   WorldPoint place{};
   while (const std::optional<std::string> line = reader.next(flush)) {
@@ -347,23 +305,31 @@ WorldGeoreference places_of(ArchiveReader& archive, bool needs_geo, bool needs_s
   if (!lacks(places, needs_geo, needs_source)) return places;
   throw Error(ErrorCode::kInvalidArgument, archive.path() + ": its source has no place in " +
                                                (needs_geo ? "degrees" : "coordinates") +
-                                               "; give places in world units, --at X Z");
+                                               "; give places in world units, --in world");
+}
+
+/// The sun of --date, or that of --sun.
+Sun sun_of(const SampleOptions& options, ArchiveReader& archive) {
+  const SunPlace place = options.date ? sun_of_day(archive, *options.date) : options.sun_place;
+  Sun sun;
+  sun.azimuth_deg = place.azimuth_deg;
+  sun.elevation_deg = place.elevation_deg;
+  return sun;
 }
 
 int run(SampleOptions options) {
+  const Common& common = options.common;
   ArchiveReader archive = open_archive(options.archive);
-  print_warnings(archive.warnings());
-  const bool takes_geo = options.reads_degrees || !options.geo_places.empty();
-  const bool takes_source = options.reads_source || !options.source_places.empty();
+  print_warnings(common, archive.warnings());
+  const bool takes_geo = options.in == PlaceKind::kGeo;
+  const bool takes_source = options.in == PlaceKind::kSource;
   const WorldGeoreference places =
-      places_of(archive, takes_geo || options.with_degrees, takes_source || options.with_source, options.common.json);
+      places_of(archive, takes_geo || options.with_degrees, takes_source || options.with_source, common.json);
+  options.sun = sun_of(options, archive);
   PlaceOutput output;
-  if (options.with_degrees || (options.common.json && places.has_geo())) output.geo = &places;
-  if (options.with_source || (options.common.json && places.has_source())) output.source = &places;
-  PlaceHints hints(archive.metadata(), options.archive,
-                   takes_geo      ? PlaceKind::kGeo
-                   : takes_source ? PlaceKind::kSource
-                                  : PlaceKind::kWorld);
+  if (options.with_degrees || (common.json && places.has_geo())) output.geo = &places;
+  if (options.with_source || (common.json && places.has_source())) output.source = &places;
+  PlaceHints hints(archive.metadata(), options.archive, options.in);
   WorkArena threads(options.threads);
   threads.execute([&] {
     Answers answers(archive, options, output);
@@ -374,12 +340,10 @@ int run(SampleOptions options) {
       hints.look_at(typed, place);
       answers.add(place);
     };
-    for (const WorldPoint place : options.places) take({place.x, place.z});
-    for (const GeoPoint place : options.geo_places) take({place.longitude, place.latitude});
-    for (const MapPoint place : options.source_places) take(place);
-    if (options.places.empty() && options.geo_places.empty() && options.source_places.empty()) {
+    for (const MapPoint place : options.places) take(place);
+    if (options.places.empty()) {
       try {
-        read_places(answers, take);
+        read_places(common, answers, take);
       } catch (const Error&) {
         answers.flush();  // what came before a bad place is answered
         throw;
@@ -387,15 +351,44 @@ int run(SampleOptions options) {
     }
     answers.flush();
   });
-  if (!hints.hint().empty()) print_warning(archive.path() + ": " + hints.hint());
+  if (!hints.hint().empty()) print_warning(common, archive.path() + ": " + hints.hint());
   return kExitDone;
 }
 
 }  // namespace
 
-int command_sample(const Arguments& arguments) {
-  std::optional<SampleOptions> options = parse_sample(arguments);
-  return options ? run(std::move(*options)) : static_cast<int>(kExitDone);
+Run add_sample(CLI::App& line, Common& common) {
+  const auto kept = std::make_shared<SampleOptions>(SampleOptions{common});
+  SampleOptions& options = *kept;
+  positional(line, "ARCHIVE", "Archive to sample", options.archive);
+  repeated(line, "--at", "X,Z", "A place, instead of those on standard input; may be given again",
+           [&options](const std::string& text) {
+             WorldPoint place{};
+             if (!read_place(text, place))
+               throw Error(ErrorCode::kInvalidArgument,
+                           "found '" + text + "', must be X,Z, two numbers, as in 500,300");
+             options.places.push_back({place.x, place.z});
+           });
+  choice<PlaceKind>(line, "--in",
+                    {{"world", PlaceKind::kWorld}, {"lonlat", PlaceKind::kGeo}, {"crs", PlaceKind::kSource}},
+                    "Places are world units, degrees of longitude and latitude, or coordinates of the input [default: "
+                    "world]",
+                    options.in);
+  repeated(line, "--with", "lonlat|crs", "Print the place too, in degrees or in coordinates of the input",
+           [&options](const std::string& text) {
+             (parse_word(text, {"lonlat", "crs"}) == 0 ? options.with_degrees : options.with_source) = true;
+           });
+  group(line, "Shadow");
+  CLI::Option* const shadow = line.add_flag("--shadow", options.with_shadow,
+                                            "Print the shadow's elevation and the visible share of the sun too");
+  option(line, "--above", "H", "Look from H above the surface, vertical units [default: 0]",
+         [&options](const std::string& text) { options.above = parse_height(text); })
+      ->needs(shadow);
+  add_sun_options(line, options.sun_place, options.date);
+  for (const char* name : {"--sun", "--date"}) line.get_option(name)->needs(shadow);
+  add_threads_option(line, options.threads);
+  line.footer(kSampleFooter);
+  return [kept] { return run(*kept); };
 }
 
 }  // namespace isohf::cli

@@ -21,9 +21,10 @@
 #include "isohf/verify.h"
 #include "isohf/verify/accuracy/same_source.h"
 #include "open_archive.h"
+#include "options/command_line.h"
 #include "options/describe.h"
 #include "options/option_values.h"
-#include "options/options_common.h"
+#include "options/work_options.h"
 #include "output/accuracy_output.h"
 #include "output/json_output.h"
 #include "output/standard_output.h"
@@ -44,57 +45,15 @@ Examples:
   isohf verify dem.isohf --against dem.tif --max-error 5)";
 
 struct VerifyCommandOptions {
-  CommonOptions common;
-  WorkOptions work;
-  std::vector<std::string> archives;
-  std::string archive;  ///< the one in hand
-  std::vector<std::string> against;
-  GeoidRequest geoid;
-  std::optional<double> max_error;
-  std::optional<double> max_rms;
+  const Common& common;
+  WorkOptions work{};
+  std::vector<std::string> archives{};
+  std::string archive{};  ///< the one in hand
+  std::vector<std::string> against{};
+  GeoidRequest geoid{};
+  std::optional<double> max_error{};
+  std::optional<double> max_rms{};
 };
-
-std::optional<VerifyCommandOptions> parse_verify(const Arguments& arguments) {
-  VerifyCommandOptions options;
-  CommandLine line("verify", "Checks archives, and compares one with what it was made from.");
-  line.group("Arguments");
-  line.positionals("ARCHIVE...",
-                   "Archives to check, one after the other: files, folders of .isohf, \"patterns*\" and @lists",
-                   options.archives);
-  line.group("Comparison");
-  line.repeated(
-      "--against", "INPUT",
-      "Measure the surface against the raster it was made from; a folder, \"pattern*\" or @list, or again and "
-      "again, for a mosaic",
-      options.against);
-  const auto limit = [](std::optional<double>& value) {
-    return [&value](const std::string& text) {
-      double found = 0.0;
-      if (!read_number(text, found) || !(found >= 0.0)) {
-        throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be a number of at least 0");
-      }
-      value = found;
-    };
-  };
-  line.option("--max-error", "E", "Exit 3 where an input sample is missed by more than E (default: any error passes)",
-              limit(options.max_error));
-  line.option("--max-rms", "E", "Exit 3 where the root mean square error is above E (default: any passes)",
-              limit(options.max_rms));
-  add_geoid_option(line, options.geoid);
-  add_work_options(line, options.work);
-  add_memory_option(line, options.work);
-  add_common_options(line, options.common);
-  line.footer(kVerifyFooter);
-  if (!line.parse(arguments)) return std::nullopt;
-  std::error_code none;
-  options.work.scratch_folder = std::filesystem::temp_directory_path(none).string();
-  line.require("ARCHIVE", options.archives);
-  if (options.against.empty()) {
-    const std::string option = line.first_given({"Comparison"});
-    if (!option.empty()) throw Error(ErrorCode::kInvalidArgument, "verify: " + option + " needs --against INPUT");
-  }
-  return options;
-}
 
 const char* to_word(Severity severity) {
   switch (severity) {
@@ -114,7 +73,7 @@ ordered_json checks_of(const VerifyReport& report) {
     ordered_json json = {{"id", finding_name(finding.id)}, {"severity", to_word(finding.severity)}};
     json["tile"] = finding.tile ? ordered_json{{"column", finding.tile->column}, {"row", finding.tile->row}}
                                 : ordered_json(nullptr);
-    json["text"] = finding.text;
+    json["text"] = spelled(finding.text);
     findings.push_back(std::move(json));
   }
   return {{"passed", report.passed()},
@@ -127,7 +86,7 @@ ordered_json checks_of(const VerifyReport& report) {
 std::string text_from(const Finding& finding) {
   std::string text = finding_name(finding.id) + " " + to_word(finding.severity);
   if (finding.tile) text += fmt::format(" tile ({},{})", finding.tile->column, finding.tile->row);
-  return text + ": " + printable(finding.text) + "\n";
+  return text + ": " + printable(spelled(finding.text)) + "\n";
 }
 
 /// What the comparison found beside errors of size: ground that is missing or made up, away from borders of voids.
@@ -230,8 +189,7 @@ std::string why_too_far(const VerifyCommandOptions& options, const AccuracyRepor
 }
 
 int check_one(const VerifyCommandOptions& options, bool is_one_of_many) {
-  std::optional<ProgressDisplay> display(std::in_place, options.work.progress, options.common.quiet,
-                                         options.common.verbose);
+  std::optional<ProgressDisplay> display(std::in_place, options.common, options.work.progress);
   const Job job = job_from(options.work, *display);
   VerifyReport report = verify_archive(options.archive, job);
   if (!report.findings.empty() && report.findings.front().id == finding::kNotReadable) {
@@ -250,7 +208,7 @@ int check_one(const VerifyCommandOptions& options, bool is_one_of_many) {
     const auto same_system = are_same(source_georeference(metadata.source).system, info.georeference.system);
     for (const Warning& warning : check_same_source(archive, info, same_system)) {
       display->clear();
-      print_warning(warning);
+      print_warning(options.common, warning);
     }
     accuracy = measure_accuracy(options.archive, *source, job);
     add_findings(*accuracy, contradiction(metadata, accuracy->surface), report);
@@ -259,7 +217,7 @@ int check_one(const VerifyCommandOptions& options, bool is_one_of_many) {
   const std::string too_far = accuracy ? why_too_far(options, accuracy->surface) : "";
   const bool passed = report.passed() && too_far.empty();
 
-  StandardOutput out;
+  StandardOutput out(options.common);
   if (options.common.json) {
     ordered_json document = {{"archive", options.archive}, {"passed", passed}, {"checks", checks_of(report)}};
     if (accuracy) document["against"] = json_from(*accuracy);
@@ -283,14 +241,13 @@ int check_one(const VerifyCommandOptions& options, bool is_one_of_many) {
 int run(const VerifyCommandOptions& options) {
   const std::vector<std::string> files = list_files(options.archives, true);
   if (files.size() > 1 && !options.against.empty()) {
-    throw Error(
-        ErrorCode::kInvalidArgument,
-        fmt::format("verify: --against compares one archive with its input, {} archives are given; every file of "
-                    "a mosaic wants an --against of its own (--against a.tif --against b.tif), or one "
-                    "pattern in quotes takes them all (--against \"*.tif\")",
-                    files.size()));
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("--against compares one archive with its input, {} archives are given; every file of "
+                            "a mosaic wants an --against of its own (--against a.tif --against b.tif), or one "
+                            "pattern in quotes takes them all (--against \"*.tif\")",
+                            files.size()));
   }
-  return for_each_file("verify", files, options.common, [&](const std::string& file) {
+  return for_each_file(files, options.common, [&](const std::string& file) {
     VerifyCommandOptions one = options;
     one.archive = file;
     return check_one(one, files.size() > 1);
@@ -299,9 +256,40 @@ int run(const VerifyCommandOptions& options) {
 
 }  // namespace
 
-int command_verify(const Arguments& arguments) {
-  const std::optional<VerifyCommandOptions> options = parse_verify(arguments);
-  return options ? run(*options) : static_cast<int>(kExitDone);
+Run add_verify(CLI::App& line, Common& common) {
+  const auto kept = std::make_shared<VerifyCommandOptions>(VerifyCommandOptions{common});
+  VerifyCommandOptions& options = *kept;
+  positionals(line, "ARCHIVE...", "Archives to check: files, folders of .isohf, \"patterns*\" and @lists",
+              options.archives)
+      ->required();
+  group(line, "Comparison");
+  CLI::Option* const against = repeated(line, "--against", "INPUT",
+                                        "Measure the surface against the raster it was made from; for a mosaic a "
+                                        "folder, \"pattern*\" or @list, or several "
+                                        "--against",
+                                        [&options](const std::string& text) { options.against.push_back(text); });
+  const auto limit = [](std::optional<double>& value) {
+    return [&value](const std::string& text) {
+      double found = 0.0;
+      if (!read_number(text, found) || !(found >= 0.0)) {
+        throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be a number of at least 0");
+      }
+      value = found;
+    };
+  };
+  option(line, "--max-error", "E", "Exit with 3 if a sample is off by more than E", limit(options.max_error))
+      ->needs(against);
+  option(line, "--max-rms", "E", "Exit with 3 if the root mean square error is above E", limit(options.max_rms))
+      ->needs(against);
+  add_geoid_option(line, options.geoid)->needs(against);
+  add_work_options(line, options.work, common);
+  add_memory_option(line, options.work);
+  line.footer(kVerifyFooter);
+  return [kept] {
+    std::error_code none;
+    kept->work.scratch_folder = std::filesystem::temp_directory_path(none).string();
+    return run(*kept);
+  };
 }
 
 }  // namespace isohf::cli

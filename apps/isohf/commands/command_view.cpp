@@ -1,14 +1,15 @@
-/// isohf view: starts isohf-view, the program that draws.
+/// isohf view: becomes isohf-view, the program that draws and the only one that links GL.
 
 #include "commands/command.h"
-#include "options.h"
 
 namespace isohf::cli {
 
-int command_view(const Arguments& arguments) {
-  // Wrong options and --help are answered here; the program of its own starts only to draw.
-  if (!view::parse_options(arguments)) return kExitDone;
-  become_program("isohf-view", arguments);
+Run add_view(CLI::App& line, Common& /*common*/) {
+  // Its options are that program's, --help included.
+  line.set_help_flag();
+  line.set_help_all_flag();
+  line.prefix_command()->fallthrough(false);
+  return [&line]() -> int { become_program("isohf-view", line.remaining()); };
 }
 
 }  // namespace isohf::cli

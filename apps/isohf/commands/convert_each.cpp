@@ -79,9 +79,8 @@ class Gate {
 /// Hands out files, and tells of them in their order.
 class Batch {
  public:
-  Batch(const std::vector<EachFile>& files, const EachOptions& options, const WorkOptions& work,
-        const CommonOptions& common)
-      : files_(files), options_(options), common_(common), display_(work.progress, common.quiet, common.verbose) {}
+  Batch(const std::vector<EachFile>& files, bool keep_going, const WorkOptions& work, const Common& common)
+      : files_(files), keep_going_(keep_going), common_(common), display_(common, work.progress), out_(common) {}
 
   using Outcome = std::variant<EachResult, Error, std::exception_ptr>;
 
@@ -94,7 +93,7 @@ class Batch {
   void finished(std::size_t number, Outcome outcome) {
     const std::lock_guard lock(mutex_);
     if (const auto* error = std::get_if<Error>(&outcome); error != nullptr) {
-      if (!options_.keep_going && error->code() != ErrorCode::kNoElevation) stopped_ = true;
+      if (!keep_going_ && error->code() != ErrorCode::kNoElevation) stopped_ = true;
       if (error->code() == ErrorCode::kCancelled) stopped_ = interrupted_ = true;
       if (is_disk_full(files_[number], *error)) stopped_ = true;
     }
@@ -148,7 +147,7 @@ class Batch {
                    "", "the same command with --resume goes on"});
     }
     if (failed_.empty()) return kExitDone;
-    return options_.keep_going ? static_cast<int>(kExitFailed) : exit_code_for(failed_.front().code());
+    return keep_going_ ? static_cast<int>(kExitFailed) : exit_code_for(failed_.front().code());
   }
 
  private:
@@ -157,16 +156,16 @@ class Batch {
     if (const auto* result = std::get_if<EachResult>(&outcome); result != nullptr) {
       (result->is_converted ? converted_ : complete_) += 1;
       if (!result->warnings.empty() || !result->note.empty()) display_.clear();
-      if (!result->note.empty() && !common_.quiet) print_note(result->note);
+      if (!result->note.empty() && !common_.quiet) print_note(common_, result->note);
       for (const Warning& warning : result->warnings) {
         const bool names_it = warning.find(file.input) != std::string::npos;
-        print_warning(names_it ? warning : warning.reworded(file.input + ": " + warning));
+        print_warning(common_, names_it ? warning : warning.reworded(file.input + ": " + warning));
       }
       document.update(ordered_json::parse(result->document));
     } else if (const Error& error = std::get<Error>(outcome); error.code() == ErrorCode::kNoElevation) {
       ++empty_;
       display_.clear();
-      if (!common_.quiet) print_note(error.what());
+      if (!common_.quiet) print_note(common_, error.what());
       document["status"] = "nodata";
     } else {
       if (error.code() == ErrorCode::kCancelled) return;
@@ -176,7 +175,7 @@ class Batch {
       disk_full_ = disk_full_ || is_full;
       display_.clear();
       failed_.push_back(error);
-      print_error_line(error);
+      print_error_line(common_, error);
       document["status"] = "failed";
       document["error"] = json_from(error, exit_code_for(error.code()));
     }
@@ -186,8 +185,8 @@ class Batch {
   }
 
   const std::vector<EachFile>& files_;
-  const EachOptions& options_;
-  const CommonOptions& common_;
+  bool keep_going_;
+  const Common& common_;
   ProgressDisplay display_;
   StandardOutput out_;
   const Clock::time_point started_ = Clock::now();
@@ -207,14 +206,6 @@ class Batch {
 
 }  // namespace
 
-void add_each_options(CommandLine& line, EachOptions& options) {
-  line.group("Many archives");
-  line.flag("--each", "Make one archive of each input: DIR/NAME.isohf, small ones side by side; all names are inputs",
-            options.each);
-  line.option("--out-dir", "DIR", "The folder for the archives of --each; made where absent", options.folder);
-  line.flag("--keep-going", "With --each: go on where a file fails; exit code 1 at the end", options.keep_going);
-}
-
 std::vector<EachFile> files_of_each(const std::vector<std::string>& inputs, bool recursive, const std::string& folder) {
   std::vector<EachFile> files;
   std::map<std::string, std::string> input_of;
@@ -231,8 +222,8 @@ std::vector<EachFile> files_of_each(const std::vector<std::string>& inputs, bool
   return files;
 }
 
-int convert_each(const std::vector<EachFile>& files, const EachOptions& options, const WorkOptions& work,
-                 const CommonOptions& common, const ConvertOneFile& convert_one, const std::atomic<bool>& cancel) {
+int convert_each(const std::vector<EachFile>& files, bool keep_going, const WorkOptions& work, const Common& common,
+                 const ConvertOneFile& convert_one, const std::atomic<bool>& cancel) {
   const Job whole = job_from(work);
   const auto threads = work.threads > 0 ? static_cast<std::size_t>(work.threads)
                                         : std::max<std::size_t>(1, std::thread::hardware_concurrency());
@@ -243,7 +234,7 @@ int convert_each(const std::vector<EachFile>& files, const EachOptions& options,
   const EachShare all{static_cast<int>(threads), whole.memory_bytes, whole.machine_bytes, true};
 
   Gate gate;
-  Batch batch(files, options, work, common);
+  Batch batch(files, keep_going, work, common);
   const auto convert_in = [&](const EachFile& file, const EachShare& share) {
     gate.enter(share.alone);
     struct Leave {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "isohf/error.h"
-#include "options/options_common.h"
+#include "options/work_options.h"
 
 namespace isohf::cli {
 
@@ -16,15 +16,6 @@ struct EachFile {
   std::string input;
   std::string output;
 };
-
-/// What convert --each is asked for beyond the conversions themselves.
-struct EachOptions {
-  std::string folder;       ///< --out-dir; empty: a single archive
-  bool each = false;        ///< --each
-  bool keep_going = false;  ///< a file that fails does not stop the others
-};
-
-void add_each_options(CommandLine& line, EachOptions& options);
 
 /// Inputs, as expand_inputs takes them, and the archive of each: FOLDER/NAME.isohf, in the folders that --recursive
 /// found it in. Throws Error{kInvalidArgument} where two would be one.
@@ -54,7 +45,7 @@ using ConvertOneFile = std::function<std::optional<EachResult>(const EachFile& f
 /// stay within the memory that work allows. Where the disk is full, none is begun any more. Tells of every file in the
 /// order of the inputs, and of all at the end.
 /// Returns the exit code. Throws Error{kCancelled}.
-int convert_each(const std::vector<EachFile>& files, const EachOptions& options, const WorkOptions& work,
-                 const CommonOptions& common, const ConvertOneFile& convert_one, const std::atomic<bool>& cancel);
+int convert_each(const std::vector<EachFile>& files, bool keep_going, const WorkOptions& work, const Common& common,
+                 const ConvertOneFile& convert_one, const std::atomic<bool>& cancel);
 
 }  // namespace isohf::cli

@@ -33,9 +33,9 @@ std::optional<std::string> LineReader::take_line() {
   return line;
 }
 
-bool LineReader::would_wait() {
+bool LineReader::would_wait() const {
   struct pollfd input {
-    STDIN_FILENO, POLLIN, 0
+    file_, POLLIN, 0
   };
   return ::poll(&input, 1, 0) == 0;
 }
@@ -51,7 +51,7 @@ void LineReader::read_more() {
   buffer_.resize(old_size + kReadBytes);
   ssize_t got = 0;
   do {
-    got = ::read(STDIN_FILENO, buffer_.data() + old_size, kReadBytes);
+    got = ::read(file_, buffer_.data() + old_size, kReadBytes);
   } while (got < 0 && errno == EINTR);
   if (got < 0) throw Error(ErrorCode::kIo, std::string("standard input: ") + std::strerror(errno));
   buffer_.resize(old_size + static_cast<std::size_t>(got));

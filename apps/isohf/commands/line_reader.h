@@ -9,6 +9,9 @@ namespace isohf::cli {
 /// Standard input, line by line, without its line ends ("\n" or "\r\n").
 class LineReader {
  public:
+  /// file  a descriptor
+  explicit LineReader(int file) : file_(file) {}
+
   /// The next line; nullopt at the end. Calls `before_waiting` where the operating system has nothing more yet, so that
   /// a program at the other end of a pipe sees the answers to all that it has sent. Throws Error{kIo}, and
   /// Error{kCorrupt} for lines that are absurdly long.
@@ -27,9 +30,10 @@ class LineReader {
 
  private:
   std::optional<std::string> take_line();
-  [[nodiscard]] static bool would_wait();
+  [[nodiscard]] bool would_wait() const;
   void read_more();
 
+  int file_;
   std::string buffer_;
   std::size_t from_ = 0;
   bool at_end_ = false;

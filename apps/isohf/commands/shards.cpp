@@ -23,7 +23,7 @@ using nlohmann::ordered_json;
 
 /// A line that the log of a scheduler can be searched for.
 void print_shard(const ConvertCommandOptions& options, const char* status, const ConvertSummary* summary) {
-  StandardOutput out;
+  StandardOutput out(options.common);
   const ShardNumber& shard = *options.shard;
   const std::uint64_t bytes = std::filesystem::file_size(options.output);
   const std::uint64_t peak = peak_memory_bytes();
@@ -33,7 +33,7 @@ void print_shard(const ConvertCommandOptions& options, const char* status, const
     if (summary != nullptr) {
       document["tiles_written"] = summary->tiles_written;
       document["seconds"] = summary->seconds;
-      document["warnings"] = summary->warnings;
+      document["warnings"] = json_from(summary->warnings);
     }
     out.write(json_text(document));
   } else if (!options.common.quiet) {
@@ -62,8 +62,7 @@ int convert_shard_of(ConvertCommandOptions options) {
     return kExitDone;
   }
   check_archive_output(options.inputs.names, options.output, overwrite);
-  std::optional<ProgressDisplay> display(std::in_place, options.work.progress, options.common.quiet,
-                                         options.common.verbose);
+  std::optional<ProgressDisplay> display(std::in_place, options.common, options.work.progress);
   const ConvertSummary summary = [&] {
     try {
       return convert_shard(source, *options.shard, options.output, options.convert, job_from(options.work, *display));
@@ -73,7 +72,7 @@ int convert_shard_of(ConvertCommandOptions options) {
     }
   }();
   display.reset();
-  print_warnings(summary.warnings);
+  print_warnings(options.common, summary.warnings);
   print_shard(options, "done", &summary);
   return kExitDone;
 }

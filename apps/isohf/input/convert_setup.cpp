@@ -30,9 +30,10 @@
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "isohf/resampling.h"
+#include "options/command_line.h"
 #include "options/describe.h"
 #include "options/option_values.h"
-#include "options/options_common.h"
+#include "options/work_options.h"
 #include "output/accuracy_output.h"
 #include "output/json_output.h"
 #include "output/output_kinds.h"
@@ -43,51 +44,13 @@
 namespace isohf::cli {
 namespace {
 
-constexpr const char* kFooter =
-    R"(The archive is written as OUTPUT.part and renamed when it is complete; an interrupted run leaves the
-part for --resume and nothing under the final name. The bytes do not depend on --threads.
-
-Examples:
-  isohf convert dem.tif dem.isohf
-  isohf convert dem.tif -o dem.isohf --density 0.866 --outside void --overwrite
-  isohf convert dem.tif dem.isohf --texture orthophoto.tif
-  isohf convert N4*E00*.hgt alps.isohf               many inputs form one surface
-  isohf convert tiles/ -o land.isohf --strict        fails if a tile is missing
-  isohf convert heights.exr h.isohf --channel R --z-scale 1200 --sample-spacing 2
-  isohf convert tiles/ -o part-3.isohf --shard 3/64 --z-range -100:5000    one of many machines
-  isohf plan dem.tif                  the same options without writing: see what comes out
-  isohf convert --each tiles/ --recursive --out-dir archives --keep-going    one of each
-  isohf convert --each tiles/ --recursive --out-dir archives --resume        goes on)";
-
-/// The last name is the output where -o names none and it is called .isohf. Any other name is an input: a forgotten
-/// output must not cost the last of them.
+/// The last name is the output if -o names none and it is called .isohf. Any other name is an input: a forgotten output
+/// must not cost the last of them.
 void take_output(ConvertCommandOptions& options) {
   std::vector<std::string>& names = options.inputs.names;
-  if (!options.output.empty() || names.size() < 2) return;
-  if (is_archive_name(names.back())) {
-    options.output = names.back();
-    names.pop_back();
-  } else if (!options.dry_run) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("convert: no OUTPUT given: {0} is not called .isohf and counts as an input; name the "
-                            "archive NAME.isohf, or give -o {0} if that is meant",
-                            names.back()));
-  }
-}
-
-/// What belongs to --each alone, and what has no meaning for many archives.
-void check_each_options(const CommandLine& line, const ConvertCommandOptions& options) {
-  const auto refuse = [](const std::string& why) {
-    throw Error(ErrorCode::kInvalidArgument, {"convert", why, "", ""});
-  };
-  for (const char* option : {"--out-dir", "--keep-going"}) {
-    if (!options.each.each && line.given(option)) refuse(std::string(option) + " needs --each");
-  }
-  if (!options.each.each) return;
-  if (options.each.folder.empty()) refuse("--each needs --out-dir DIR, where the archives go");
-  for (const char* option : {"--output", "--dry-run", "--overlap"}) {
-    if (line.given(option)) refuse(fmt::format("{} is for one archive, --each makes many; leave one out", option));
-  }
+  if (!options.output.empty() || names.size() < 2 || !is_archive_name(names.back())) return;
+  options.output = names.back();
+  names.pop_back();
 }
 
 /// "3/64".
@@ -100,17 +63,25 @@ ShardNumber shard_from_string(const std::string& text) {
           static_cast<int>(parse_whole_number(text.substr(slash + 1), 1, kMostShards))};
 }
 
-void check_shard_options(const CommandLine& line, const ConvertCommandOptions& options) {
-  const auto refuse = [](const std::string& why) {
-    throw Error(ErrorCode::kInvalidArgument, {"convert", why, "", ""});
+[[noreturn]] void refuse(const std::string& why) {
+  throw Error(ErrorCode::kInvalidArgument, why);
+}
+
+/// What has no meaning for many archives, or for a shard.
+void check_kind(const CLI::App& line, const ConvertCommandOptions& options) {
+  const auto refuse_with = [&](const char* kind, std::initializer_list<const char*> others) {
+    for (const char* option : others) {
+      if (given(line, option)) refuse(fmt::format("{} cannot be combined with {}", option, kind));
+    }
   };
-  for (const char* option : {"--each", "--dry-run", "--resume", "--max-error"}) {
-    if (line.given(option)) refuse(fmt::format("{} has no place with --shard", option));
-  }
+  if (!options.out_dir.empty()) refuse_with("--out-dir", {"--output", "--shard", "--on-top"});
+  if (options.keep_going && options.out_dir.empty()) refuse("--keep-going needs --out-dir");
+  if (!options.shard) return;
+  refuse_with("--shard", {"--resume", "--max-error"});
   if (!options.convert.z_range && options.convert.code_type != CodeType::kF32) {
     refuse(
-        "--shard needs --z-range MIN:MAX, or --type f32, as no shard sees all elevations; isohf info --stats INPUT "
-        "prints their range");
+        "--shard needs --z-range MIN:MAX, or --type f32, as no shard sees all elevations; isohf plan INPUT --shard K/N "
+        "prints the range");
   }
 }
 
@@ -121,95 +92,56 @@ void share_memory(ConvertCommandOptions& options) {
   options.open.unpacked_bytes = options.work.unpacked_bytes(options.open.unpacked_bytes);
 }
 
-std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments) {
-  ConvertCommandOptions options;
-  std::optional<double> sun_min_deg;
-  CommandLine line("convert", "Turns rasters of elevations into an archive of isometric heightfield tiles.");
-  line.group("Arguments");
-  line.positionals("INPUT... OUTPUT",
-                   "Rasters of elevations: files, folders, \"patterns*\" and @lists, which form one source; then the "
-                   "archive to write, NAME.isohf",
-                   options.inputs.names);
-  line.option("-o,--output", "OUTPUT", "The archive to write; then all others are inputs", options.output);
-  line.flag("--overwrite", "Replace OUTPUT where it exists", options.convert.overwrite);
-  line.flag("--resume",
-            "Continue OUTPUT.part of an interrupted run, or OUTPUT.part.old if that is larger, after checking it",
-            options.convert.resume);
-  line.flag("--dry-run", "Print the plan and write nothing, as isohf plan INPUT does", options.dry_run);
-  line.option("--shard", "K/N",
-              "Make shard K of N, some rows of tiles; isohf merge joins them. Needs --z-range, or --type f32",
-              [&](const std::string& text) { options.shard = shard_from_string(text); });
-  add_each_options(line, options.each);
+void add_conversion_options(CLI::App& line, ConvertCommandOptions& options, Common& common) {
+  option(line, "-o,--output", "OUTPUT", "Archive to write [default: the last name, if it ends in .isohf]",
+         options.output);
+  line.add_flag("--overwrite", options.convert.overwrite, "Replace OUTPUT if it exists");
+  line.add_flag("--resume", options.convert.resume,
+                "Continue OUTPUT.part of an interrupted run after checking it, and skip complete archives");
+  option(line, "--out-dir", "DIR", "Make DIR/NAME.isohf from each input; all names are inputs", options.out_dir);
+  line.add_flag("--keep-going", options.keep_going, "With --out-dir: continue after a failed input");
+  option(line, "--shard", "K/N", "Make shard K of N, some rows of tiles; isohf merge joins them",
+         [&options](const std::string& text) { options.shard = shard_from_string(text); });
   add_source_options(line, options.open);
   add_mosaic_options(line, options.inputs);
   add_lattice_options(line, options.convert.plan, options.spacing_in_metres);
+  add_shape_options(line, options.convert.plan);
   add_ground_options(line, options.convert.plan.ground);
   add_geoid_option(line, options.geoid);
-  add_shape_options(line, options.convert.plan);
   add_quantisation_options(line, options.convert);
-  line.group("Reconstruction");
-  line.option("--filter", "NAME",
-              "nearest, bilinear, limited-cubic or bspline3 (default " + to_string(kDefaultFilter) + ")",
-              [&](const std::string& text) { options.convert.filter = filter_from_string(text); });
-  line.words({"nearest", "bilinear", "limited-cubic", "bspline3"});
-  line.option("--acquisition", "NAME",
-              "Account for how samples were taken: point, box, gaussian:SIGMA or taps as 0.25,0.5,0.25 (default " +
-                  to_string(options.convert.acquisition) + ")",
-              [&](const std::string& text) { options.convert.acquisition = acquisition_from_string(text); });
-  line.words({"point", "box", "gaussian"});
-  line.group("Size and speed");
-  line.option("--effort", "WORD",
-              "Effort to make the archive small: fast, default or best; the elevations are the same",
-              [&](const std::string& text) {
-                options.convert.effort = static_cast<Effort>(parse_word(text, {"fast", "default", "best"}));
-              });
-  line.words({"fast", "default", "best"});
-  line.group("Shadows");
-  bool shadow_seeds = false;
-  line.flag(
-      "--shadow-seeds",
-      "Store the shadows that tiles cast over their neighbours, so that none needs another, for every sun elevation "
-      "from --sun-min on",
-      shadow_seeds, [&] { options.convert.shadow_seeds.emplace(); });
-  line.option("--sun-min", "DEG", "Lowest sun elevation for --shadow-seeds (default 2); a lower one takes more room",
-              [&](const std::string& text) { sun_min_deg = parse_number(text); });
+  group(line, "Reconstruction");
+  option(line, "--filter", "nearest|bilinear|limited-cubic|bspline3",
+         "Reconstruction filter [default: " + to_string(kDefaultFilter) + "]",
+         [&options](const std::string& text) { options.convert.filter = filter_from_string(text); });
+  option(line, "--acquisition", "point|box|gaussian:SIGMA|TAPS",
+         "How samples were taken; taps as in 0.25,0.5,0.25 [default: " + to_string(options.convert.acquisition) + "]",
+         [&options](const std::string& text) { options.convert.acquisition = acquisition_from_string(text); });
+  group(line, "Size and extras");
+  choice<Effort>(line, "--effort", {{"fast", Effort::kFast}, {"default", Effort::kDefault}, {"best", Effort::kBest}},
+                 "Effort to make the archive small; the elevations are the same", options.convert.effort);
+  line.add_flag("--lossless", options.convert.lossless,
+                "Store residuals too, so that isohf export returns every sample bit for bit");
+  CLI::Option* const seeds = line.add_flag_callback(
+      "--shadow-seeds", [&options] { options.convert.shadow_seeds.emplace(); },
+      "Store what each tile needs to compute its own cast shadows");
+  option(line, "--sun-min", "DEG", "Lowest sun for --shadow-seeds; a lower one takes more room [default: 2]",
+         [&options](const std::string& text) { options.convert.shadow_seeds.value().sun_min_deg = parse_number(text); })
+      ->needs(seeds);
   add_texture_options(line, options.texture);
-  line.group("Residuals");
-  line.flag("--lossless", "Keep residuals as well, so that export gives INPUT's samples bit for bit",
-            options.convert.lossless);
-  add_work_options(line, options.work);
+  add_work_options(line, options.work, common);
   add_memory_option(line, options.work);
-  add_common_options(line, options.common);
-  line.footer(kFooter);
-  if (!line.parse(arguments)) return std::nullopt;
-  check_each_options(line, options);
-  if (options.shard) check_shard_options(line, options);
-  if (!options.each.each) take_output(options);
-  line.require("INPUT", options.inputs.names);
-  if (!options.dry_run && !options.each.each) line.require("OUTPUT", options.output);
-  if (options.convert.clamp_range && !options.convert.z_range) {
-    throw Error(ErrorCode::kInvalidArgument, "convert: --clamp-range needs --z-range MIN:MAX");
-  }
-  if (options.convert.max_error && options.dry_run) {
-    throw Error(ErrorCode::kInvalidArgument,
-                "convert: --dry-run cannot tell what --max-error will choose; leave one of the two out");
-  }
-  if (sun_min_deg) {
-    if (!options.convert.shadow_seeds) {
-      throw Error(ErrorCode::kInvalidArgument, "convert: --sun-min needs --shadow-seeds");
-    }
-    options.convert.shadow_seeds->sun_min_deg = *sun_min_deg;
-  }
+}
+
+void complete(const CLI::App& line, ConvertCommandOptions& options) {
+  check_kind(line, options);
+  if (options.out_dir.empty()) take_output(options);
   if (options.convert.lossless && !options.geoid.path.empty()) {
-    throw Error(ErrorCode::kInvalidArgument,
-                "convert: --lossless keeps the input's own samples, --geoid changes them; give one of the two");
+    refuse("--lossless keeps the input's own samples, --geoid changes them; give one of the two");
   }
   options.inputs.as_given = recorded_options(line);
-  check_texture_options(options.texture);
-  options.work.scratch_folder = scratch_folder_for(options.each.each ? options.each.folder + "/" : options.output);
+  options.work.scratch_folder = scratch_folder_for(options.out_dir.empty() ? options.output : options.out_dir + "/");
   share_memory(options);
   options.convert.strict = options.common.strict;
-  return options;
 }
 
 Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files) {

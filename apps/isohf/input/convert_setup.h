@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "commands/convert_each.h"
 #include "input/options_ground.h"
 #include "input/options_source.h"
 #include "input/options_texture.h"
@@ -14,28 +13,32 @@
 #include "isohf/convert.h"
 #include "isohf/raster.h"
 #include "isohf/shards.h"
-#include "options/options_common.h"
+#include "options/work_options.h"
+#include "program.h"
 
 namespace isohf::cli {
 
+/// Of convert, and of plan, which previews it.
 struct ConvertCommandOptions {
-  CommonOptions common;
-  WorkOptions work;
-  SourceInputs inputs;
-  std::string input;  ///< what messages and reports call them: the file, or "mosaic of 12 files"
-  std::string output;
-  OpenOptions open;
-  TextureOptions texture;
-  ConvertOptions convert;
-  GeoidRequest geoid;
+  const Common& common;
+  WorkOptions work{};
+  SourceInputs inputs{};
+  std::string input{};  ///< what messages and reports call them: the file, or "mosaic of 12 files"
+  std::string output{};
+  std::string out_dir{};    ///< for an archive of each input; empty: one of all
+  bool keep_going = false;  ///< a file that fails does not stop the others
+  OpenOptions open{};
+  TextureOptions texture{};
+  ConvertOptions convert{};
+  GeoidRequest geoid{};
   bool spacing_in_metres = false;
-  bool dry_run = false;
-  std::optional<ShardNumber> shard;
-  EachOptions each;
+  std::optional<ShardNumber> shard{};
 };
 
-/// nullopt: help was printed. Throws Error{kInvalidArgument}.
-[[nodiscard]] std::optional<ConvertCommandOptions> parse_convert(const Arguments& arguments);
+/// All options but INPUT.
+void add_conversion_options(CLI::App& line, ConvertCommandOptions& options, Common& common);
+/// After parsing: checks what options cannot check alone, and derives the rest. Throws Error{kInvalidArgument}.
+void complete(const CLI::App& line, ConvertCommandOptions& options);
 /// What is packed shares the memory with what is read from it, and with the tiles.
 void share_memory(ConvertCommandOptions& options);
 

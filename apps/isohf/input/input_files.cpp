@@ -18,7 +18,6 @@
 #include "isohf/error.h"
 #include "output/json_output.h"
 #include "output/standard_output.h"
-#include "program.h"
 
 namespace isohf::cli {
 namespace {
@@ -202,7 +201,7 @@ std::vector<std::string> list_files(const std::vector<std::string>& inputs, bool
   return found;
 }
 
-int for_each_file(const std::string& command, const std::vector<std::string>& files, const CommonOptions& common,
+int for_each_file(const std::vector<std::string>& files, const Common& common,
                   const std::function<int(const std::string& file)>& work) {
   if (files.size() == 1) return work(files.front());
   std::map<int, std::size_t> counts;
@@ -213,9 +212,9 @@ int for_each_file(const std::string& command, const std::vector<std::string>& fi
     } catch (const Error& error) {
       if (error.code() == ErrorCode::kCancelled) throw;
       code = exit_code_for(error.code());
-      print_error_line(error);
+      print_error_line(common, error);
       if (common.json) {
-        StandardOutput out;
+        StandardOutput out(common);
         out.write(json_line({{"file", file}, {"error", json_from(error, code)}}));
         out.finish();
       }
@@ -224,9 +223,9 @@ int for_each_file(const std::string& command, const std::vector<std::string>& fi
   }
   if (!common.quiet) {
     const std::size_t differ = counts[kExitDifferences];
-    print_note(fmt::format("{}: {} files: {} done, {}{} failed", command, files.size(), counts[kExitDone],
-                           differ > 0 ? fmt::format("{} with differences, ", differ) : "",
-                           counts[kExitFailed] + counts[kExitUsage]));
+    print_note(common, fmt::format("{} files: {} done, {}{} failed", files.size(), counts[kExitDone],
+                                   differ > 0 ? fmt::format("{} with differences, ", differ) : "",
+                                   counts[kExitFailed] + counts[kExitUsage]));
   }
   for (const int code : {kExitUsage, kExitFailed, kExitDifferences}) {
     if (counts[code] > 0) return code;

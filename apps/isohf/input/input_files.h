@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "options/options_common.h"
+#include "common.h"
 
 namespace isohf::cli {
 
@@ -35,7 +35,7 @@ struct InputFile {
 /// Goes through files one after the other: `work` returns an exit code or throws Error, which is said and does not keep
 /// the others from their turn; with `json` it is an object on a line as well. Of several files a line on standard error
 /// sums up. Returns the worst exit code: wrong usage before failure before differences. A single file's Error goes on.
-[[nodiscard]] int for_each_file(const std::string& command, const std::vector<std::string>& files,
-                                const CommonOptions& common, const std::function<int(const std::string& file)>& work);
+[[nodiscard]] int for_each_file(const std::vector<std::string>& files, const Common& common,
+                                const std::function<int(const std::string& file)>& work);
 
 }  // namespace isohf::cli

@@ -6,37 +6,47 @@
 #include "formats/adapters/windowed_source.h"
 #include "input/options_source.h"
 #include "isohf/convert/frame/source_frame.h"
+#include "options/command_line.h"
+#include "options/option_values.h"
 
 namespace isohf::cli {
 
-void add_ground_options(CommandLine& line, GroundRequest& request) {
-  static const std::vector<std::string> kinds = {
-      "auto", "equirectangular", "local", "transverse-mercator", "utm", "lambert-conformal", "polar-stereographic",
-      "none"};
-  line.group("Ground");
-  line.option("--to-crs", "KIND",
-              "Project degrees to metres, and maps to truer ones: equirectangular, local, transverse-mercator, utm, "
-              "lambert-conformal, polar-stereographic, none, or chosen by extent (default: auto of degrees, none of "
-              "maps); parameters may "
-              "follow, as in utm:32N; or a reference system: EPSG:3035, WKT, a PROJ string, or a file with one of them",
-              [&](const std::string& text) {
-                // A file may be called as a kind is.
-                const bool is_kind = std::ranges::find(kinds, text.substr(0, text.find(':'))) != kinds.end();
-                request.projection = ProjectionRequest::parse(is_kind ? text : system_from(text));
-              });
-  line.words(kinds);
-  line.flag("--wrap-x", "Require that the input goes all the way round, and join its East edge to its West edge",
-            [&] { request.wrap = Wrap::kAlways; });
-  line.flag("--no-wrap", "Leave an input that goes all the way round open (default: join its edges)",
-            [&] { request.wrap = Wrap::kNever; });
-  line.exclusive({"--wrap-x", "--no-wrap"});
+void add_ground_options(CLI::App& line, GroundRequest& request) {
+  group(line, "Map");
+  option(line, "--to-crs", "SYSTEM",
+         "Map of the result: auto, none, equirectangular, local, utm, transverse-mercator, lambert-conformal, "
+         "polar-stereographic (parameters follow a colon, as in utm:32N), or a reference system as for --crs [default: "
+         "auto for degrees, none for maps]",
+         [&request](const std::string& text) {
+           static const std::vector<std::string> kKinds = {"auto",
+                                                           "none",
+                                                           "equirectangular",
+                                                           "local",
+                                                           "utm",
+                                                           "transverse-mercator",
+                                                           "lambert-conformal",
+                                                           "polar-stereographic"};
+           const std::string word = text.substr(0, text.find(':'));
+           // A file may be called as a kind is.
+           const bool is_kind = std::ranges::find(kKinds, word) != kKinds.end();
+           try {
+             request.projection = ProjectionRequest::parse(is_kind ? text : system_from(text));
+           } catch (const Error& error) {
+             throw Error(error.code(), error.what() + did_you_mean(word, kKinds), error.parts());
+           }
+         });
+  line.add_flag_callback(
+      "--wrap-x", [&request] { request.wrap = Wrap::kAlways; },
+      "Join the East edge to the West edge, or fail [default: if the input goes all the way round]");
+  line.add_flag_callback(
+      "--no-wrap", [&request] { request.wrap = Wrap::kNever; }, "Do not join them");
+  exclusive(line, {"--wrap-x", "--no-wrap"});
 }
 
-void add_geoid_option(CommandLine& line, GeoidRequest& request) {
-  line.option("--geoid", "FILE.pgm[:WAY]",
-              "Move elevations by a geoid of GeographicLib's: to-ellipsoidal, from heights above it (default), or "
-              "to-orthometric",
-              [&](const std::string& text) { request = GeoidRequest::parse(text); });
+CLI::Option* add_geoid_option(CLI::App& line, GeoidRequest& request) {
+  return option(line, "--geoid", "FILE.pgm[:WAY]",
+                "Apply a GeographicLib geoid: to-ellipsoidal or to-orthometric [default: to-ellipsoidal]",
+                [&request](const std::string& text) { request = GeoidRequest::parse(text); });
 }
 
 std::unique_ptr<HeightSource> with_geoid(std::unique_ptr<HeightSource> source, const GeoidRequest& request) {

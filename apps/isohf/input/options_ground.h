@@ -4,15 +4,15 @@
 
 #include "isohf/convert.h"
 #include "isohf/fill/geoid_source.h"
-#include "options/command_line.h"
+#include "program.h"
 
 namespace isohf::cli {
 
 /// How a source in degrees is laid out on the ground plane: --to-crs, --wrap-x, --no-wrap.
-void add_ground_options(CommandLine& line, GroundRequest& request);
+void add_ground_options(CLI::App& line, GroundRequest& request);
 
 /// --geoid FILE.pgm[:to-ellipsoidal|to-orthometric].
-void add_geoid_option(CommandLine& line, GeoidRequest& request);
+CLI::Option* add_geoid_option(CLI::App& line, GeoidRequest& request);
 
 /// The source with its elevations moved, where that was asked for.
 [[nodiscard]] std::unique_ptr<HeightSource> with_geoid(std::unique_ptr<HeightSource> source,

@@ -8,34 +8,27 @@
 #include "isohf/error.h"
 #include "isohf/photo/texture_cutter.h"
 #include "isohf/picture.h"
+#include "options/command_line.h"
 #include "options/describe.h"
 #include "options/option_values.h"
 
 namespace isohf::cli {
 
-void add_texture_options(CommandLine& line, TextureOptions& options) {
-  line.group("Textures");
-  line.option(
-      "--texture", "PHOTO",
-      "Cut a texture for every tile out of this picture, which lies as its georeference says, or covers exactly "
-      "the input's ground; any format that OpenImageIO reads, larger than memory if need be",
-      options.photo);
-  line.option(
-      "--texture-size", "N",
-      "Texels on a side at most, a power of two from 64 to 4096 (default 1024); fewer where the photo has no more",
-      [&options](const std::string& text) {
-        const std::int64_t size = parse_whole_number(text, kMinTextureSize, kMaxTextureSize);
-        if (!std::has_single_bit(static_cast<std::uint64_t>(size))) {
-          throw Error(ErrorCode::kInvalidArgument, fmt::format("found '{}', must be a power of two", text));
-        }
-        options.max_size = static_cast<int>(size);
-      });
-}
-
-void check_texture_options(const TextureOptions& options) {
-  if (options.photo.empty() && options.max_size) {
-    throw Error(ErrorCode::kInvalidArgument, "convert: --texture-size needs --texture PHOTO");
-  }
+void add_texture_options(CLI::App& line, TextureOptions& options) {
+  CLI::Option* const photo =
+      option(line, "--texture", "PHOTO",
+             "Cut a texture for every tile from a picture, placed by its georeference, else over "
+             "the whole input",
+             options.photo);
+  option(line, "--texture-size", "N", "At most N texels a side, a power of two from 64 to 4096 [default: 1024]",
+         [&options](const std::string& text) {
+           const std::int64_t size = parse_whole_number(text, kMinTextureSize, kMaxTextureSize);
+           if (!std::has_single_bit(static_cast<std::uint64_t>(size))) {
+             throw Error(ErrorCode::kInvalidArgument, fmt::format("found '{}', must be a power of two", text));
+           }
+           options.max_size = static_cast<int>(size);
+         })
+      ->needs(photo);
 }
 
 std::unique_ptr<PhotoSource> open_texture(const TextureOptions& options, const SourceInfo& source,

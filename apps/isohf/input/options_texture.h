@@ -6,7 +6,7 @@
 
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/convert.h"
-#include "options/command_line.h"
+#include "program.h"
 
 namespace isohf::cli {
 
@@ -16,10 +16,7 @@ struct TextureOptions {
   std::optional<int> max_size;
 };
 
-void add_texture_options(CommandLine& line, TextureOptions& options);
-/// Throws Error{kInvalidArgument} for a size without a photo.
-void check_texture_options(const TextureOptions& options);
-
+void add_texture_options(CLI::App& line, TextureOptions& options);
 /// Opens the photo of a source and fills `request`, which points to it; nullptr where none was asked for.
 [[nodiscard]] std::unique_ptr<PhotoSource> open_texture(const TextureOptions& options, const SourceInfo& source,
                                                         std::optional<TextureRequest>& request);

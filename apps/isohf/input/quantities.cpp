@@ -49,28 +49,4 @@ double parse_ratio(const std::string& text) {
   return ratio;
 }
 
-double parse_altitude(const std::string& text) {
-  const double degrees = parse_number(text);
-  if (!(degrees >= 0.01 && degrees <= 90.0)) {
-    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be degrees from 0.01 to 90");
-  }
-  return degrees;
-}
-
-double parse_azimuth(const std::string& text) {
-  constexpr std::pair<const char*, double> kSides[] = {{"N", 0.0}, {"E", 90.0}, {"S", 180.0}, {"W", 270.0}};
-  for (const auto& [side, degrees] : kSides) {
-    if (text == side) return degrees;
-  }
-  double degrees = -1.0;
-  try {
-    degrees = parse_number(text);
-  } catch (const Error&) {
-  }
-  if (!(degrees >= 0.0 && degrees <= 360.0)) {
-    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be degrees from 0 to 360, or N, E, S, W");
-  }
-  return degrees;
-}
-
 }  // namespace isohf::cli

@@ -17,10 +17,4 @@ struct LengthValue {
 /// A positive number, or a fraction of two as in 1/2. Throws likewise.
 [[nodiscard]] double parse_ratio(const std::string& text);
 
-/// Degrees clockwise from North, 0 to 360; N, E, S or W. Throws likewise.
-[[nodiscard]] double parse_azimuth(const std::string& text);
-
-/// Degrees above the horizon, 0.01 to 90. Throws likewise.
-[[nodiscard]] double parse_altitude(const std::string& text);
-
 }  // namespace isohf::cli

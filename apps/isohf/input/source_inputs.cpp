@@ -12,6 +12,7 @@
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
+#include "options/command_line.h"
 #include "options/option_values.h"
 #include "work_arena.h"
 
@@ -76,19 +77,15 @@ void take_box(const SourceInputs& inputs, OpenedInputs& opened) {
 
 }  // namespace
 
-void add_mosaic_options(CommandLine& line, SourceInputs& inputs) {
-  line.option("--bbox", "W,S,E,N",
-              "Only the part between these coordinates of the input's reference system, whole samples",
-              [&](const std::string& text) { inputs.box = bounding_box_from_string(text); });
-  line.group("Several inputs");
-  line.option(
-      "--overlap", "RULE",
-      "Where inputs of one resolution overlap, the last (default) or the first named shows; finer ones always lie "
-      "over coarser ones, and voids show what lies below",
-      [&](const std::string& text) {
-        inputs.overlap = parse_word(text, {"last", "first"}) == 0 ? OverlapRule::kLast : OverlapRule::kFirst;
-      });
-  line.flag("--recursive", "Look into the folders of a folder as well", inputs.recursive);
+void add_mosaic_options(CLI::App& line, SourceInputs& inputs) {
+  option(line, "--bbox", "W,S,E,N", "Convert only this part, in the input's coordinates",
+         [&inputs](const std::string& text) { inputs.box = bounding_box_from_string(text); });
+  group(line, "Joining inputs");
+  choice<OverlapRule>(line, "--on-top", {{"last", OverlapRule::kLast}, {"first", OverlapRule::kFirst}},
+                      "Which of overlapping inputs shows. Finer inputs always do, and nodata shows what is below "
+                      "[default: last]",
+                      inputs.overlap);
+  line.add_flag("--recursive", inputs.recursive, "Search folders of folders too");
 }
 
 namespace {
@@ -110,53 +107,69 @@ std::string with_plain_numbers(const std::string& text) {
   return plain;
 }
 
-bool takes_numbers(const std::string& option) {
-  constexpr std::array kThese = {"--nodata",  "--valid-range", "--fill-distance",
-                                 "--z-scale", "--z-offset",    "--sample-spacing"};
-  return std::find(kThese.begin(), kThese.end(), option) != kThese.end();
+bool takes_numbers(const std::string& name) {
+  constexpr std::array kThese = {"nodata", "valid-range", "fill", "z-scale", "z-offset", "sample-spacing"};
+  return std::find(kThese.begin(), kThese.end(), name) != kThese.end();
+}
+
+/// Declares the options of an input in a command line of its own.
+void declare_input(CLI::App& line, RecordedInput& input) {
+  line.set_help_flag();
+  line.option_defaults()->take_last();
+  add_source_options(line, input.open);
+  add_mosaic_options(line, input.inputs);
+  add_geoid_option(line, input.geoid);
 }
 
 }  // namespace
 
-RecordedOptions recorded_options(const CommandLine& line) {
+RecordedOptions recorded_options(const CLI::App& line) {
+  RecordedInput unused;
+  CLI::App input;
+  declare_input(input, unused);
   RecordedOptions recorded;
-  for (auto& [name, text] : line.texts_in({"Input", "Several inputs"})) {
-    // Not what files are found by: the same samples, the same bytes. Nor a file that holds the text of a system.
-    if (name != "--recursive") {
-      recorded.emplace_back(name.substr(2), takes_numbers(name) ? with_plain_numbers(text)
-                                            : name == "--crs"   ? system_from(text)
-                                                                : text);
-    }
-  }
-  for (auto& [name, text] : line.texts_in({"Ground"})) {
-    if (name == "--geoid") recorded.emplace_back("geoid", file_name(text));
+  for (const CLI::Option* declared : input.get_options()) {
+    const std::string option = long_name(*declared);
+    const std::string name = option.substr(2);
+    // Files are found by --recursive; the same samples are the same bytes.
+    if (name == "recursive" || !given(line, option)) continue;
+    const std::string text = line.get_option(option)->results().back();
+    if (text == "false") continue;
+    // Not the file that holds the text of a system, nor the folder of a geoid.
+    recorded.emplace_back(name, takes_numbers(name) ? with_plain_numbers(text)
+                                : name == "crs"     ? system_from(text)
+                                : name == "geoid"   ? file_name(text)
+                                                    : text);
   }
   return recorded;
 }
 
 RecordedInput recorded_input(const RecordedOptions& recorded) {
   RecordedInput input;
-  CommandLine line("the input's options", "");
-  add_source_options(line, input.open);
-  add_mosaic_options(line, input.inputs);
-  add_geoid_option(line, input.geoid);
+  CLI::App line;
+  declare_input(line, input);
   // Nothing that an archive records names a file but the geoid, and that without a folder.
-  RecordedOptions texts;
+  std::vector<std::string> words;
   for (const auto& [name, text] : recorded) {
     if (name == "crs") {
       input.open.reference_system = text;
     } else {
-      texts.emplace_back(name, text);
+      words.insert(words.begin(), "--" + name + "=" + text);  // CLI11 takes the last one first
     }
   }
+  const auto refuse = [](const std::string& why) {
+    throw Error(ErrorCode::kCorrupt, "isohf.json: source.options: " + why);
+  };
   try {
-    line.parse_recorded(texts);
-    if (input.geoid.path != file_name(input.geoid.path)) {
-      throw Error(ErrorCode::kInvalidArgument, {"geoid", "'" + input.geoid.path + "'", "a name without a folder", ""});
-    }
-  } catch (const Error& error) {
-    throw Error(ErrorCode::kCorrupt, error.within("isohf.json: source.options").what());
+    line.parse(words);
+  } catch (const BadValue& bad) {
+    refuse(bad.error.within(bad.option.substr(2)).what());
+  } catch (const CLI::ExtrasError&) {
+    refuse(line.remaining().front().substr(2) + ": is not an option of an input");
+  } catch (const CLI::ParseError& error) {
+    refuse(error.what());
   }
+  if (input.geoid.path != file_name(input.geoid.path)) refuse("geoid: must be a name without a folder");
   return input;
 }
 

@@ -12,8 +12,7 @@
 #include "isohf/convert.h"
 #include "isohf/fill/geoid_source.h"
 #include "isohf/raster.h"
-#include "options/command_line.h"
-#include "options/options_common.h"
+#include "options/work_options.h"
 
 namespace isohf::cli {
 
@@ -30,12 +29,11 @@ struct SourceInputs {
   ProjectionRequest onto;                   ///< the map on which inputs of different reference systems are joined
 };
 
-/// --bbox, and the group "Several inputs": --overlap, --recursive.
-void add_mosaic_options(CommandLine& line, SourceInputs& inputs);
+/// --bbox, --on-top, --recursive.
+void add_mosaic_options(CLI::App& line, SourceInputs& inputs);
 
-/// After parsing: the options of the groups "Input" and "Several inputs" that say how samples are read, and of a geoid
-/// the file's name, not its folder.
-[[nodiscard]] RecordedOptions recorded_options(const CommandLine& line);
+/// After parsing: the options by which samples are read, and of a geoid the file's name without its folder.
+[[nodiscard]] RecordedOptions recorded_options(const CLI::App& line);
 
 /// An input's options, as an archive records them.
 struct RecordedInput {

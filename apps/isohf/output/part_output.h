@@ -5,12 +5,12 @@
 
 #include "isohf/job.h"
 #include "isohf/parts.h"
-#include "options/options_common.h"
+#include "options/work_options.h"
 
 namespace isohf::cli {
 
 /// Runs what copies tiles to an archive, and prints what came of it. Returns the exit code.
-int print_part(const std::string& output, const CommonOptions& common, const WorkOptions& work,
+int print_part(const std::string& output, const Common& common, const WorkOptions& work,
                const std::function<PartSummary(const Job&)>& write);
 
 }  // namespace isohf::cli

@@ -103,7 +103,7 @@ std::string text_from_plan(const SourceInfo& info, const Plan& plan, const Memor
 
 }  // namespace
 
-void print_plan(HeightSource& source, const ConvertOptions& options, const Job& job, const CommonOptions& common) {
+void print_plan(HeightSource& source, const ConvertOptions& options, const Job& job, const Common& common) {
   const SourceInfo& info = source.info();
   const Plan plan = make_plan(info, options.plan);
   const MemoryPlan memory = plan_memory(source, plan, options, job);
@@ -121,14 +121,14 @@ void print_plan(HeightSource& source, const ConvertOptions& options, const Job& 
     is_refused = true;
     all.emplace_back(fmt::format("convert would refuse: {}", refusal.what()));
   }
-  print_warnings(all);
+  print_warnings(common, all);
   ErrorEstimate error;
   if (is_refused) {
     error.why_none = "the conversion would be refused";
   } else {
     error = estimate_error(source, options, job);
   }
-  StandardOutput out;
+  StandardOutput out(common);
   if (common.json) {
     out.write(json_text(json_from_plan(info, plan, memory, job.bound_bytes(), options.code_type, error, warnings)));
   } else if (!common.quiet) {
@@ -137,11 +137,11 @@ void print_plan(HeightSource& source, const ConvertOptions& options, const Job& 
   out.finish();
 }
 
-void print_plan_notes(HeightSource& source, const ConvertOptions& options, const Job& job) {
+void print_plan_notes(HeightSource& source, const ConvertOptions& options, const Job& job, const Common& common) {
   const Plan plan = make_plan(source.info(), options.plan);
   std::istringstream lines(text_from_plan(source.info(), plan, plan_memory(source, plan, options, job), options,
                                           estimate_error(source, options, job)));
-  for (std::string line; std::getline(lines, line);) print_note(line);
+  for (std::string line; std::getline(lines, line);) print_note(common, line);
 }
 
 }  // namespace isohf::cli

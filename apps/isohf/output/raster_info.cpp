@@ -41,9 +41,9 @@ Registration registration_used(const Georeference& place) {
   return place.has_origin ? Registration::kArea : Registration::kPoint;
 }
 
-SourceSurvey survey(HeightSource& source, const CommonOptions& common) {
+SourceSurvey survey(HeightSource& source, const Common& common) {
   const std::atomic<bool>& cancel = watch_interrupts();
-  ProgressDisplay display(ProgressMode::kAuto, common.quiet, common.verbose);
+  ProgressDisplay display(common, ProgressMode::kAuto);
   const SourceInfo& info = source.info();
   constexpr std::uint64_t kReadBytes = std::uint64_t{8} << 20U;
   const ReadStep step = ReadStep::make(info, kReadBytes);
@@ -244,8 +244,8 @@ bool is_archive(const std::string& path, const OpenOptions& options) {
   return is_zip || path.ends_with(".isohf");
 }
 
-void print_raster_info(const std::string& path, const OpenOptions& options, bool with_statistics,
-                       const CommonOptions& common, bool is_one_of_many) {
+void print_raster_info(const std::string& path, const OpenOptions& options, bool with_statistics, const Common& common,
+                       bool is_one_of_many) {
   const std::unique_ptr<HeightSource> source = open_raster(path, options);
   RasterInfo raster;
   raster.source = source->info();
@@ -262,8 +262,8 @@ void print_raster_info(const std::string& path, const OpenOptions& options, bool
   }
   std::vector<Warning> named;
   for (const Warning& warning : warnings) named.push_back(warning.reworded(path + ": " + warning));
-  print_warnings(named);
-  StandardOutput out;
+  print_warnings(common, named);
+  StandardOutput out(common);
   if (common.json) {
     const ordered_json document = document_of(raster, warnings);
     out.write(is_one_of_many ? json_line(document) : json_text(document));

@@ -4,7 +4,7 @@
 
 #include "formats/registry.h"
 #include "isohf/raster.h"
-#include "options/options_common.h"
+#include "options/work_options.h"
 
 namespace isohf::cli {
 
@@ -13,7 +13,7 @@ namespace isohf::cli {
 [[nodiscard]] bool is_archive(const std::string& path, const OpenOptions& options);
 
 /// Prints what is understood of a raster; `with_statistics` reads all of it. JSON of one of many takes a line.
-void print_raster_info(const std::string& path, const OpenOptions& options, bool with_statistics,
-                       const CommonOptions& common, bool is_one_of_many);
+void print_raster_info(const std::string& path, const OpenOptions& options, bool with_statistics, const Common& common,
+                       bool is_one_of_many);
 
 }  // namespace isohf::cli

@@ -120,22 +120,23 @@ SampleMapping spread_over(SampleType type, RowReader rows, const Job& job, bool&
   return low <= high ? spread(type, {low, high}, has_voids) : SampleMapping{type, 1.0, 0.0};
 }
 
-void warn_of_whole_numbers(const std::string& output, const Metadata& metadata) {
+void warn_of_whole_numbers(const Common& common, const std::string& output, const Metadata& metadata) {
   const std::string& unit = metadata.vertical_unit;
-  print_warning(loss(fmt::format("{}: holds whole numbers: elevations are rounded by up to 0.5 {}", output,
-                                 unit == "unknown" ? "of their unit" : unit)));
+  print_warning(common, loss(fmt::format("{}: holds whole numbers: elevations are rounded by up to 0.5 {}", output,
+                                         unit == "unknown" ? "of their unit" : unit)));
 }
 
-void warn_of_halves(const std::string& output, const Metadata& metadata) {
+void warn_of_halves(const Common& common, const std::string& output, const Metadata& metadata) {
   const Statistics& found = metadata.statistics;
   const double largest = std::max(std::abs(found.min.value_or(0.0)), std::abs(found.max.value_or(0.0)));
   if (!(largest > 0.0)) return;
   const std::string& unit = metadata.vertical_unit;
-  print_warning(loss(fmt::format("{}: half floats have 11 bits: elevations are rounded by up to {:.3g} {}", output,
+  print_warning(common,
+                loss(fmt::format("{}: half floats have 11 bits: elevations are rounded by up to {:.3g} {}", output,
                                  std::exp2(std::ilogb(largest) - 11), unit == "unknown" ? "of their unit" : unit)));
 }
 
-void warn_of_losses(const std::string& output, const RasterSpec& spec) {
+void warn_of_losses(const Common& common, const std::string& output, const RasterSpec& spec) {
   const RasterKind kind = raster_kind(output);
   std::vector<Warning> lost;
   const auto say = [&](const std::string& what) { lost.push_back(loss(output + ": " + what)); };
@@ -164,7 +165,7 @@ void warn_of_losses(const std::string& output, const RasterSpec& spec) {
       say("readers take it for heights above the geoid, and these are above the ellipsoid");
     }
   }
-  print_warnings(lost);
+  print_warnings(common, lost);
 }
 
 void refuse_sample(const std::string& output, SampleType type, std::int64_t column, std::int64_t row,

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/restore/sample_store.h"
 #include "isohf/surface.h"
@@ -39,11 +40,11 @@ enum class RasterKind { kTiff, kExr, kPng, kHgt, kAsc, kFlt, kRaw16, kRaw32, kNp
 /// All elevations of a grid, spread over an integer type. Reads them; `has_voids` becomes whether some are void.
 [[nodiscard]] SampleMapping spread_over(SampleType type, RowReader rows, const Job& job, bool& has_voids);
 /// A warning that elevations in `output` are rounded to whole units.
-void warn_of_whole_numbers(const std::string& output, const Metadata& metadata);
+void warn_of_whole_numbers(const Common& common, const std::string& output, const Metadata& metadata);
 /// A warning of how far half floats round the archive's largest elevation.
-void warn_of_halves(const std::string& output, const Metadata& metadata);
+void warn_of_halves(const Common& common, const std::string& output, const Metadata& metadata);
 /// Warnings of what `spec` says and the format of `output` has no place for, or says otherwise.
-void warn_of_losses(const std::string& output, const RasterSpec& spec);
+void warn_of_losses(const Common& common, const std::string& output, const RasterSpec& spec);
 
 /// Throws Error{kInvalidArgument} for a sample that a raster's type does not hold, naming column, row and remedy.
 [[noreturn]] void refuse_sample(const std::string& output, SampleType type, std::int64_t column, std::int64_t row,

@@ -16,7 +16,8 @@
 
 namespace isohf::cli {
 
-WrittenSamples write_source_samples(const ArchiveReader& archive, const SourceSamplesTarget& target, const Job& job) {
+WrittenSamples write_source_samples(const Common& common, const ArchiveReader& archive,
+                                    const SourceSamplesTarget& target, const Job& job) {
   const Metadata& metadata = archive.metadata();
   const RasterKind kind = raster_kind(target.output);
   SourceRowReader reader(archive, job);
@@ -43,7 +44,7 @@ WrittenSamples write_source_samples(const ArchiveReader& archive, const SourceSa
   spec.overwrite = target.overwrite;
   spec.scratch = target.scratch;
   const std::unique_ptr<RasterSink> sink = create_raster(target.output, spec);
-  warn_of_losses(target.output, sink->spec());
+  warn_of_losses(common, target.output, sink->spec());
   std::int64_t row = 0;
   // Voids that the output has no word for, and how often they stand there: a value each, nullopt by a range.
   std::map<std::optional<double>, std::int64_t> untold;
@@ -83,10 +84,10 @@ WrittenSamples write_source_samples(const ArchiveReader& archive, const SourceSa
     const std::string which =
         value ? fmt::format("hold {:.9g}", *value)
               : fmt::format("lie outside {:.9g} to {:.9g}", record.valid.first, record.valid.second);
-    print_warning(
-        loss(fmt::format("{}: {} samples {}, which meant no elevation: a reader must be told, as with "
-                         "{}; --method hex writes one void value",
-                         target.output, count, which, value ? "--nodata" : "--valid-range")));
+    print_warning(common,
+                  loss(fmt::format("{}: {} samples {}, which meant no elevation: a reader must be told, as with "
+                                   "{}; --method hex writes one void value",
+                                   target.output, count, which, value ? "--nodata" : "--valid-range")));
   }
   sink->finish();
   return {written, sink->files()};

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "common.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/archive.h"
 #include "isohf/restore/sample_store.h"
@@ -25,7 +26,7 @@ struct WrittenSamples {
 
 /// Writes the samples that --lossless kept, bit for bit, or in another type if it holds every one of them exactly. Prints
 /// warnings. Throws Error{kInvalidArgument} for a sample that the type does not hold, kCorrupt as SourceRowReader, kIo.
-[[nodiscard]] WrittenSamples write_source_samples(const ArchiveReader& archive, const SourceSamplesTarget& target,
-                                                  const Job& job);
+[[nodiscard]] WrittenSamples write_source_samples(const Common& common, const ArchiveReader& archive,
+                                                  const SourceSamplesTarget& target, const Job& job);
 
 }  // namespace isohf::cli

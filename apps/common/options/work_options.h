@@ -9,17 +9,6 @@
 
 namespace isohf::cli {
 
-/// Options that every command knows.
-struct CommonOptions {
-  bool json = false;
-  bool quiet = false;
-  bool verbose = false;
-  bool strict = false;
-};
-
-/// --json, -q, --strict, -v. (--help and --config are CommandLine's own.)
-void add_common_options(CommandLine& line, CommonOptions& options);
-
 /// Options of commands that take a while.
 struct WorkOptions {
   int threads = 0;                 ///< 0: all cores
@@ -32,12 +21,12 @@ struct WorkOptions {
 };
 
 /// -j alone.
-void add_threads_option(CommandLine& line, int& threads);
+void add_threads_option(CLI::App& line, int& threads);
 /// -j, --progress.
-void add_work_options(CommandLine& line, WorkOptions& options);
+void add_work_options(CLI::App& line, WorkOptions& options, Common& common);
 
 /// --memory SIZE.
-void add_memory_option(CommandLine& line, WorkOptions& options);
+void add_memory_option(CLI::App& line, WorkOptions& options);
 
 /// The folder for the scratch file that --memory may need: TMPDIR, or the output's folder if that is not set.
 [[nodiscard]] std::string scratch_folder_for(const std::string& output);
