@@ -20,6 +20,8 @@ foreach(path IN LISTS folders)
   endif()
 endforeach()
 
+run(${SOURCE_DIR}/manual_test.sh ${prefix})
+
 # As someone else's project, who has but the package.
 file(WRITE ${WORK_DIR}/says/CMakeLists.txt
      "cmake_minimum_required(VERSION 3.25)\nproject(says CXX)\nfind_package(isohf REQUIRED)\n"
