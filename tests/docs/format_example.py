@@ -16,7 +16,7 @@ sys.path.append(str(pathlib.Path(__file__).parent.parent.parent / "docs"))
 import reader  # noqa: E402
 
 GRID = "ncols 3\nnrows 3\nxllcorner 500000\nyllcorner 4000000\ncellsize 10\n10 11 12\n11 13 15\n12 15 20\n"
-ARGUMENTS = ["--shape", "5x5", "--levels", "1", "--tiles", "1x1"]
+ARGUMENTS = ["--shape", "5x5", "--levels", "1", "--spacing", "30"]
 HEADING = "## 14 A worked example\n"
 
 

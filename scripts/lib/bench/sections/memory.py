@@ -23,16 +23,16 @@ READERS = {"export": ("bilinear", ["export", "IN", "OUT.npy"]),
            "verify --against": ("bilinear", ["verify", "IN", "--against", "SOURCE"]),
            "shade": ("bilinear", ["shade", "IN", "OUT.png"]),
            "shade, every sample": ("bilinear", ["shade", "IN", "OUT.tif", "--size", "FULL"]),
-           "shade --azimuth 200": ("bilinear", ["shade", "IN", "OUT.tif", "--size", "FULL", "--azimuth", "200"]),
-           "shade --azimuth 350": ("bilinear", ["shade", "IN", "OUT.tif", "--size", "FULL", "--azimuth", "350"]),
-           "shade, OpenEXR": ("bilinear", ["shade", "IN", "OUT.exr", "--size", "FULL", "--azimuth", "90"]),
-           "shade --hillshade": ("bilinear", ["shade", "IN", "OUT.tif", "--size", "FULL", "--hillshade"]),
-           "shade --shadow-mask": ("bilinear", ["shade", "IN", "OUT.png", "--size", "FULL", "--shadow-mask"]),
+           "shade --sun 200,15": ("bilinear", ["shade", "IN", "OUT.tif", "--size", "FULL", "--sun", "200,15"]),
+           "shade --sun 350,15": ("bilinear", ["shade", "IN", "OUT.tif", "--size", "FULL", "--sun", "350,15"]),
+           "shade, OpenEXR": ("bilinear", ["shade", "IN", "OUT.exr", "--size", "FULL", "--sun", "90,15"]),
+           "shade --kind hillshade": ("bilinear", ["shade", "IN", "OUT.tif", "--size", "FULL", "--kind", "hillshade"]),
+           "shade --kind shadow-mask": ("bilinear", ["shade", "IN", "OUT.png", "--size", "FULL", "--kind", "shadow-mask"]),
            "sample, 1,000,000 places": ("bilinear", ["sample", "IN"]),
            "info": ("bilinear", ["info", "IN"]),
            "extract": ("bilinear", ["extract", "IN", "-o", "OUT.isohf", "--tiles", "0:9,0:1"]),
-           "extract --plane 1": ("bilinear", ["extract", "IN", "-o", "OUT.isohf", "--plane", "1"])}
-WITHOUT_LIMIT = {"info", "diff", "diff --surface", "diff --raster", "sample, 1,000,000 places", "extract", "extract --plane 1"}  # which hold as little whatever the width
+           "extract --overview 1": ("bilinear", ["extract", "IN", "-o", "OUT.isohf", "--overview", "1"])}
+WITHOUT_LIMIT = {"info", "diff", "diff --surface", "diff --raster", "sample, 1,000,000 places", "extract", "extract --overview 1"}  # which hold as little whatever the width
 DIFFER = 3  # what diff and verify end with where there is something to tell
 
 
