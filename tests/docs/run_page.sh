@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
-# run_page.sh PAGE.md BIN_DIR SOURCE_DIR WORK_DIR: runs a page of the documentation as it is printed.
+# run_page.sh PAGE.md BIN_DIR SOURCE_DIR WORK_DIR [--write]: runs a page of the documentation as it is printed.
 #   ```sh       every line is run
 #   ```console  lines that begin with "$ " are run; what follows must be what they print, figures of time and memory aside
 #   <!-- run: COMMAND -->   is run and not shown, to lay the files out that a page speaks of
+# With --write the page gets what was printed, where that differs.
 # All in one shell in WORK_DIR, which holds a copy of testdata/. The first command that fails ends the run.
 set -euo pipefail
-page=$1 bin=$2 source=$3 work=$4
+page=$1 bin=$2 source=$3 work=$4 write=${5-}
 page_folder=$source/tests/docs  # of what pages need beyond testdata/
 rm -rf "$work"
 mkdir -p "$work"
@@ -30,14 +31,21 @@ awk '
 [[ -s $work/page.commands ]] || { echo "$page: no command found" >&2; exit 1; }
 
 # Times, rates and memory differ from run to run and machine to machine; a line of the page that is "..." stands for any lines.
-masked() { sed -E 's/[0-9.]+ (ms|s|min|million)\b/N \1/g; s/^memory .*/memory/'; }
+masked() { sed -E 's/[0-9.]+ (ms|s|min|million|MB of memory)\b/N \1/g; s/^memory .*/memory/'; }
+count=0
 prints() {
-  local expected actual
+  local expected printed actual
   expected=$(masked)
-  actual=$(eval "$1" 2>&1 | masked)
+  printed=$(eval "$1" 2>&1)
+  actual=$(masked <<<"$printed")
+  count=$((count + 1))
   [[ $expected == *'...'* ]] && expected=${expected//'...'/'*'} || true
   # shellcheck disable=SC2053 # a pattern on purpose
-  if [[ $actual != $expected ]]; then
+  if [[ $actual == $expected ]]; then
+    return
+  elif [[ -n $write ]]; then
+    cat <<<"$printed" >"$work/page.$count"
+  else
     printf '%s\nshould print\n%s\nbut prints\n%s\n' "$1" "$expected" "$actual" >&2
     exit 1
   fi
@@ -50,4 +58,18 @@ set -x
 source ./page.commands
 set +x
 cd "$source"
+if [[ -n $write ]]; then
+  awk -v work="$work" '
+    /^```/ {is_console = /^```console$/; is_written = 0}
+    is_console && /^\$ / {
+      print
+      is_written = 0
+      file = work "/page." ++count
+      while ((getline line <file) > 0) {print line; is_written = 1}
+      next
+    }
+    !is_written {print}
+  ' "$page" >"$work/page.md"
+  cp "$work/page.md" "$page"
+fi
 rm -rf "$work"
