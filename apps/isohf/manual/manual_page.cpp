@@ -61,7 +61,7 @@ std::string manual_page(const CLI::App& line) {
   std::string title = page_name(line);
   std::ranges::transform(title, title.begin(), [](unsigned char c) { return std::toupper(c); });
 
-  std::string page = ".TH " + title + " 1 \"\" \"isohf " + root.version() + "\" \"isohf manual\"\n";
+  std::string page = ".TH " + title + " 1 \"\" \"isohf " + root.version() + "\" \"isohf manual\"\n.nh\n";
   page += ".SH NAME\n" + page_name(line) + " \\- " + roff(summary) + "\n";
   page += ".SH SYNOPSIS\n" + roff(usage_of(line)) + "\n";
   page += ".SH DESCRIPTION\n" + paragraphs(footer.substr(0, examples));
