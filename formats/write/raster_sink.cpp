@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <span>
 
@@ -22,6 +23,8 @@ struct Writer {
   std::unique_ptr<RasterEncoder> (*encode)(OutputFile& out, const RasterSpec& spec);
   bool has_signature;                             ///< by which its files are known; others begin in any way
   double (*least_bytes)(const RasterSpec& spec);  ///< of a sample in the file
+  std::vector<SampleType> types;                  ///< that it holds, the usual one first; empty: all
+  RasterTraits traits;
 };
 
 double plain_bytes(const RasterSpec& spec) {
@@ -40,16 +43,57 @@ double packed_bytes(const RasterSpec& spec) {
 }
 
 const std::vector<Writer>& writers() {
+  using enum SampleType;
   static const std::vector<Writer> table = {
-      {{"GeoTIFF", {".tif", ".tiff"}, tiff_library, "samples of any type"}, encode_tiff, true, packed_bytes},
-      {{"OpenEXR", {".exr"}, exr_library, "float16, float32, uint32"}, encode_exr, true, packed_bytes},
-      {{"PNG", {".png"}, png_library, "uint8, uint16"}, encode_png, true, deflated_bytes},
-      {{"SRTM HGT", {".hgt"}, nullptr, "int16; 1201x1201, 3601x3601 or 1801x3601"}, encode_hgt, false, plain_bytes},
-      {{"ESRI ASCII grid", {".asc"}, nullptr, "samples of any type"}, encode_asc, true, text_bytes},
-      {{"GridFloat", {".flt"}, nullptr, "float32; with .hdr"}, encode_flt, false, plain_bytes},
-      {{"raw 16 bit", {".r16", ".raw"}, nullptr, "uint16; with .json"}, encode_r16, false, plain_bytes},
-      {{"raw 32 bit", {".r32"}, nullptr, "float32; with .json"}, encode_r32, false, plain_bytes},
-      {{"NumPy", {".npy"}, nullptr, "samples of any type"}, encode_npy, true, plain_bytes},
+      {{"GeoTIFF", {".tif", ".tiff"}, tiff_library, "samples of any type"},
+       encode_tiff,
+       true,
+       packed_bytes,
+       {},
+       {.states_scale = true}},
+      {{"OpenEXR", {".exr"}, exr_library, "float16, float32, uint32"},
+       encode_exr,
+       true,
+       packed_bytes,
+       {kFloat32, kFloat16, kUint32},
+       {.voids_are_nan = true}},
+      {{"PNG", {".png"}, png_library, "uint8, uint16"},
+       encode_png,
+       true,
+       deflated_bytes,
+       {kUint16, kUint8},
+       {.states_scale = true}},
+      {{"SRTM HGT", {".hgt"}, nullptr, "int16; 1201x1201, 3601x3601 or 1801x3601"},
+       encode_hgt,
+       false,
+       plain_bytes,
+       {kInt16},
+       {.is_srtm = true}},
+      {{"ESRI ASCII grid", {".asc"}, nullptr, "samples of any type"},
+       encode_asc,
+       true,
+       text_bytes,
+       {},
+       {.has_place = true, .is_text = true}},
+      {{"GridFloat", {".flt"}, nullptr, "float32; with .hdr"},
+       encode_flt,
+       false,
+       plain_bytes,
+       {kFloat32},
+       {.has_place = true}},
+      {{"raw 16 bit", {".r16", ".raw"}, nullptr, "uint16; with .json"},
+       encode_r16,
+       false,
+       plain_bytes,
+       {kUint16},
+       {.states_scale = true, .is_bare = true}},
+      {{"raw 32 bit", {".r32"}, nullptr, "float32; with .json"},
+       encode_r32,
+       false,
+       plain_bytes,
+       {kFloat32},
+       {.states_scale = true, .is_bare = true}},
+      {{"NumPy", {".npy"}, nullptr, "samples of any type"}, encode_npy, true, plain_bytes, {}, {}},
   };
   return table;
 }
@@ -129,8 +173,38 @@ std::vector<std::unique_ptr<OutputFile>> begin_sidecars(const std::string& path,
   return files;
 }
 
-void remove_stale_sidecars(const std::string& path, const RasterSpec& spec) {
-  for (const std::string& stale : stale_sidecars(path, &spec)) remove_file(stale);
+/// Gives the parts of a raster and of what stands beside it their names. All is on the disk before anything gets its
+/// name, and what the raster's name stands for is complete when it appears: whoever ends the program in between finds no
+/// raster, never old samples with a new description.
+void give_names(const std::string& path, const RasterSpec& spec, const std::function<void()>& name_samples) {
+  std::string named = path;
+  std::string place;
+  bool keeps_part = false;
+  try {
+    place = output_place(path, true);
+    const bool replaces = std::filesystem::exists(place);
+    if (replaces && !spec.overwrite) {
+      keeps_part = true;
+      throw Error(ErrorCode::kIo, "was made by another program meanwhile");
+    }
+    std::vector<Sidecar> sidecars = sidecars_of(path, spec);
+    std::erase_if(sidecars, holds);
+    if (replaces && !sidecars.empty()) {
+      keeps_part = remove_file(place);
+      if (!keeps_part) throw Error(ErrorCode::kIo, "cannot be replaced");
+    }
+    for (const Sidecar& sidecar : sidecars) name_part(named = sidecar.path, spec.overwrite);
+    named = path;
+    name_samples();
+    if (!replaces) return;
+    for (const std::string& stale : stale_sidecars(path, &spec)) remove_file(stale);
+  } catch (const Error& error) {
+    if (keeps_part) {
+      throw Error(error.code(), fmt::format("{}: {}; the samples are complete in {}.part", named, error.what(), place));
+    }
+    drop_raster(path);
+    throw error.within(named);
+  }
 }
 
 }  // namespace
@@ -141,8 +215,7 @@ RasterSink::RasterSink(std::string path, const RasterSpec& spec, std::unique_ptr
       spec_(spec),
       file_(std::move(file)),
       sidecars_(std::move(sidecars)),
-      encoder_(std::move(encoder)),
-      replaces_(std::filesystem::exists(path_)) {}
+      encoder_(std::move(encoder)) {}
 
 RasterSink::~RasterSink() = default;
 
@@ -191,54 +264,15 @@ void RasterSink::complete() {
   file_->complete();
 }
 
-// All is on the disk before anything gets its name, and what the raster's name stands for is complete when it
-// appears. Whoever ends the program in between finds no raster, never old samples with a new description.
 void RasterSink::finish() {
   close();
-  bool is_removed = false;
-  try {
-    if (!sidecars_.empty()) is_removed = file_->remove_replaced();
-    for (const auto& sidecar : sidecars_) {
-      try {
-        sidecar->commit();
-      } catch (const Error& error) {
-        throw error.within(sidecar->path());
-      }
-    }
-    file_->commit();
-    if (replaces_) remove_stale_sidecars(path_, spec_);
-  } catch (const Error& error) {
-    if (is_removed) {
-      throw Error(error.code(),
-                  fmt::format("{}: {}; the samples are complete in {}", path_, error.what(), file_->part_path()));
-    }
-    throw error.within(path_);
-  }
+  for (const auto& sidecar : sidecars_) sidecar->complete();
+  file_->keep();
+  give_names(path_, spec_, [this] { file_->commit(); });
 }
 
 void name_raster(const std::string& path, const RasterSpec& spec) {
-  std::string named = path;
-  std::string place;
-  bool is_removed = false;
-  try {
-    place = output_place(path, spec.overwrite);
-    const bool replaces = std::filesystem::exists(place);
-    std::vector<Sidecar> sidecars = sidecars_of(path, spec);
-    std::erase_if(sidecars, holds);
-    if (replaces && !sidecars.empty()) {
-      is_removed = remove_file(place);
-      if (!is_removed) throw Error(ErrorCode::kIo, "cannot be replaced");
-    }
-    for (const Sidecar& sidecar : sidecars) name_part(named = sidecar.path, spec.overwrite);
-    name_part(named = path, spec.overwrite);
-    if (replaces) remove_stale_sidecars(path, spec);
-  } catch (const Error& error) {
-    if (is_removed) {
-      throw Error(error.code(), fmt::format("{}: {}; the samples are complete in {}.part", named, error.what(), place));
-    }
-    drop_raster(path);
-    throw error.within(named);
-  }
+  give_names(path, spec, [&] { name_part(path, spec.overwrite); });
 }
 
 void drop_raster(const std::string& path) noexcept {
@@ -280,6 +314,17 @@ std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterS
   } catch (const Error& error) {
     throw error.within(path);
   }
+}
+
+RasterTraits raster_traits(const std::string& path) try { return writer_for(path).traits; } catch (const Error& error) {
+  throw error.within(path);
+}
+
+SampleType held_type(const std::string& path, SampleType wanted) try {
+  const std::vector<SampleType>& types = writer_for(path).types;
+  return types.empty() || std::ranges::count(types, wanted) > 0 ? wanted : types.front();
+} catch (const Error& error) {
+  throw error.within(path);
 }
 
 void check_raster_target(const std::string& path, bool overwrite) {

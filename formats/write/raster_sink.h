@@ -9,6 +9,7 @@
 
 #include "formats/registry.h"
 #include "formats/write/raster_spec.h"
+#include "isohf/error.h"
 
 namespace isohf {
 
@@ -52,16 +53,18 @@ class RasterSink {
   std::vector<std::unique_ptr<OutputFile>> sidecars_;
   std::unique_ptr<RasterEncoder> encoder_;
   std::int64_t rows_written_ = 0;
-  bool replaces_ = false;  ///< there was a raster of this name
 };
 
 /// Begins a raster whose format follows from the extension of `path`, in any case:
 ///   .tif .tiff  TIFF 6.0: tiles of 256 x 256, or strips; deflate with predictor, BigTIFF above 4 GB, GeoTIFF keys,
-///   GDAL_NODATA; any type .exr        OpenEXR scan lines, ZIP; float16, float32, uint32 .png        uint8, uint16; a
-///   gray void value becomes the transparent one .hgt        one int16 channel of 1201 x 1201, 3601 x 3601 or 1801 x
-///   3601 samples; void is -32768 .asc        one channel of any type, in decimal; NaN becomes the lowest float .flt
-///   one float32 channel, with its .hdr; NaN becomes the lowest float .r16 .raw   one uint16 channel, little-endian,
-///   nothing else; .r32 the same of float32; with NAME.r16.json .npy        NumPy, any type
+///               GDAL_NODATA; any type
+///   .exr        OpenEXR scan lines, ZIP; float16, float32, uint32
+///   .png        uint8, uint16; a gray void value becomes the transparent one
+///   .hgt        one int16 channel of 1201 x 1201, 3601 x 3601 or 1801 x 3601 samples; void is -32768
+///   .asc        one channel of any type, in decimal; NaN becomes the lowest float
+///   .flt        one float32 channel, with its .hdr; NaN becomes the lowest float
+///   .r16 .raw   one uint16 channel, little-endian, nothing else; .r32 the same of float32; with NAME.r16.json
+///   .npy        NumPy, any type
 /// Throws Error naming the path: kInvalidArgument (no such extension; sizes, or samples that the format cannot hold;
 /// the file exists and overwrite is not set, or is of another kind), kIo.
 [[nodiscard]] std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterSpec& spec);
@@ -80,6 +83,25 @@ void check_raster_target(const std::string& path, bool overwrite);
 /// Refuses rasters, `count` of them like `path`, that the file system surely has no room for, before any work: Error{kIo}
 /// naming the path. What is compressed may become as small as its compression can make it.
 void check_raster_room(const std::string& path, const RasterSpec& spec, std::int64_t count = 1);
+
+/// What rasters of a format hold beside samples.
+struct RasterTraits {
+  bool states_scale = false;   ///< scale, offset and unit, in the file or beside it
+  bool has_place = false;      ///< always lies somewhere
+  bool is_text = false;        ///< holds any number
+  bool voids_are_nan = false;  ///< no other value can be declared
+  bool is_srtm = false;        ///< WGS 84, metres above the geoid, -32768 for nodata
+  bool is_bare = false;        ///< numbers alone, as engines read them
+};
+/// Throws Error naming the path if create_raster() knows no such extension.
+[[nodiscard]] RasterTraits raster_traits(const std::string& path);
+
+/// The sample type of a raster of that name: `wanted` if the format holds it, else the nearest that it holds (float32 in
+/// EXR and GridFloat, int16 in HGT, uint16 in PNG and .r16). Throws likewise.
+[[nodiscard]] SampleType held_type(const std::string& path, SampleType wanted);
+
+/// Warnings of what `spec` states and the format has no place for, or states otherwise.
+[[nodiscard]] std::vector<Warning> losses_of(const std::string& path, const RasterSpec& spec);
 
 /// The extensions that create_raster knows: ".tif", ...
 [[nodiscard]] const std::vector<std::string>& writable_extensions();

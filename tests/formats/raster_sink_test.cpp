@@ -285,6 +285,23 @@ TEST_F(RasterSink, WritesHgtTilesOfTheSizesThatExist) {
   EXPECT_EQ(code_of(folder / "N44E007.hgt", other_void), ErrorCode::kInvalidArgument);
 }
 
+TEST_F(RasterSink, StoresTheTypesThatItsFormatHolds) {
+  using enum SampleType;
+  for (const std::string& extension : writable_extensions()) {
+    for (const SampleType wanted : {kUint8, kUint16, kInt16, kUint32, kInt32, kFloat16, kFloat32, kFloat64}) {
+      SCOPED_TRACE(extension + " " + to_string(wanted));
+      const std::string path = folder / ("held" + extension);
+      const std::int64_t side = extension == ".hgt" ? 1201 : 4;
+      EXPECT_EQ(held_type(path, held_type(path, wanted)), held_type(path, wanted));
+      EXPECT_NO_THROW((void)create_raster(path, raster_spec(side, side, held_type(path, wanted))));
+      if (held_type(path, wanted) != wanted) {
+        EXPECT_EQ(code_of(path, raster_spec(side, side, wanted)), ErrorCode::kInvalidArgument);
+      }
+    }
+  }
+  EXPECT_THROW((void)held_type(folder / "a.xyz", kInt16), Error);
+}
+
 TEST_F(RasterSink, KeepsVoidScaleAndUnitInTiff) {
   const std::string path = folder / "void.tif";
   for (const auto& [type, value] : {std::pair{SampleType::kInt16, -32768.0},

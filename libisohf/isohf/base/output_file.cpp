@@ -231,10 +231,4 @@ void write_output(const std::string& path, std::string_view text, bool overwrite
   }
 }
 
-bool OutputFile::remove_replaced() {
-  if (!replaced_) return false;
-  if (!remove_file(place_)) throw Error(ErrorCode::kIo, "cannot be replaced: " + reason(errno));
-  return keeps_ = true;
-}
-
 }  // namespace isohf

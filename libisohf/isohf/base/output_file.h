@@ -76,10 +76,6 @@ class OutputFile {
   /// Leaves NAME.part behind, complete, flushed and closed, for name_part().
   void complete();
 
-  /// The file that is replaced goes, if there is one: nothing stands under the name until commit(), and NAME.part stays
-  /// in any case. Returns whether there was one.
-  bool remove_replaced();
-
  private:
   struct Rights {
     mode_t mode;
