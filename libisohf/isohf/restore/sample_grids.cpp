@@ -332,26 +332,6 @@ class ImageFinder {
   double reach_x_ = 1.0;     ///< East and West so many times as far
 };
 
-/// One axis of the cut: how many tiles of so many samples.
-std::int64_t cut_axis(std::int64_t& size, bool free, std::int64_t samples, std::int64_t overlap, const char* axis) {
-  if (samples <= overlap || samples < 2 * overlap) {
-    throw Error(
-        ErrorCode::kInvalidArgument,
-        fmt::format("tiles of {} {} with an overlap of {}: a tile must have at least twice the overlap, and one "
-                    "sample of its own",
-                    samples, axis, overlap));
-  }
-  const std::int64_t step = samples - overlap;
-  const auto count = std::max<std::int64_t>((size - overlap + step / 2) / step, 1);
-  const std::int64_t whole = count * step + overlap;
-  if (free) size = whole;
-  if (size != whole) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("{} {} do not make {} whole tiles of {} that share {}; {} do",
-                                                         size, axis, count, samples, overlap, whole));
-  }
-  return count;
-}
-
 }  // namespace
 
 double Turn::onto_ground(double x, double tolerance) const {
@@ -423,6 +403,12 @@ namespace {
 void require_spacing(const std::optional<double>& spacing) {
   if (spacing && !(*spacing > 0.0 && std::isfinite(*spacing)))
     refuse(fmt::format("`spacing` is {}, must be above 0", *spacing));
+}
+
+/// Before numbers of samples become whole.
+void require_fewer(double columns, double rows) {
+  if (std::max(columns, rows) < static_cast<double>(kMaxSide)) return;
+  refuse(fmt::format("`spacing` makes {:.3g} x {:.3g} samples", columns, rows));
 }
 
 }  // namespace
@@ -606,6 +592,7 @@ SampleGrid grid_in_system(const Metadata& metadata, const WorldBounds& ground, s
         step = std::round(step / grain) * grain;
       }
     }
+    require_fewer((bounds.east - bounds.west) / step, (bounds.north - bounds.south) / step);
     constexpr double kOnTheEdge = 1e-6;
     const double west = std::floor(bounds.west / step + kOnTheEdge);
     const double north = std::ceil(bounds.north / step - kOnTheEdge);
@@ -788,13 +775,6 @@ std::optional<SampleGrid> grid_like(const Metadata& metadata, const SourceInfo& 
                     source.first_sample_z + (*source.origin_y - theirs.origin_y) * to_z,
                     theirs.spacing_x * to_x,
                     theirs.spacing_y * to_z};
-}
-
-TileCut cut_into_tiles(GridSize& size, bool free, const std::optional<GridSize>& tile_size, std::int64_t overlap) {
-  if (!tile_size) return {1, 1, size.first, size.second};
-  const std::int64_t across = cut_axis(size.first, free, tile_size->first, overlap, "columns");
-  const std::int64_t down = cut_axis(size.second, free, tile_size->second, overlap, "rows");
-  return {across, down, tile_size->first, tile_size->second, overlap, true};
 }
 
 }  // namespace isohf

@@ -70,21 +70,4 @@ struct SourceGridRequest {
 [[nodiscard]] std::optional<SampleGrid> grid_like(const Metadata& metadata, const SourceInfo& other,
                                                   std::vector<std::string>& warnings);
 
-/// A raster that is cut into tiles, each as large as the others and sharing `overlap` samples with its neighbours.
-struct TileCut {
-  std::int64_t across = 1;
-  std::int64_t down = 1;
-  std::int64_t columns = 0;  ///< of a tile
-  std::int64_t rows = 0;
-  std::int64_t overlap = 0;
-  bool asked = false;  ///< every file is named by its column and row then, even a single one
-};
-
-/// How a raster of `size` samples is cut. Where `free` is set the user gave no size: that of the nearest number of whole
-/// tiles is taken, into `size`. Throws Error{kInvalidArgument} naming the nearest sizes where tiles do not come out
-/// whole, and where overlap leaves a tile nothing of its own.
-/// tile_size  samples of a tile; nullopt: the raster stays whole
-[[nodiscard]] TileCut cut_into_tiles(GridSize& size, bool free, const std::optional<GridSize>& tile_size,
-                                     std::int64_t overlap);
-
 }  // namespace isohf

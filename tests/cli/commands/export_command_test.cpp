@@ -50,7 +50,7 @@ class ExportCommand : public ::testing::Test {
     const RunResult result = run_isohf(arguments);
     EXPECT_EQ(result.exit_code, exit_code) << result.out;
     const std::string error =
-        result.err.substr(result.err.starts_with("isohf: warning") ? result.err.find('\n') + 1 : 0);
+        result.err.substr(result.err.starts_with("isohf export: warning") ? result.err.find('\n') + 1 : 0);
     EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << result.err;
     return error;
   }
@@ -74,8 +74,8 @@ TEST_F(ExportCommand, AnExtractHasElevationsOnAllOfItsEdges) {
     EXPECT_EQ(said.at("voids"), 0) << method;
   }
   const auto sampled = [&](const std::string& archive) {
-    return run_isohf({"sample", folder_ / archive, "--at", std::to_string(east), "100", "--at", "100",
-                      std::to_string(south), "--at", std::to_string(east), std::to_string(south)})
+    return run_isohf({"sample", folder_ / archive, "--at", std::to_string(east) + ",100", "--at",
+                      "100," + std::to_string(south), "--at", std::to_string(east) + "," + std::to_string(south)})
         .out;
   };
   const std::string found = sampled("part.isohf");
@@ -211,20 +211,16 @@ TEST_F(ExportCommand, SpreadsElevationsOverTheRangeAskedFor) {
   const auto [low, high] = std::minmax_element(codes.elevations.begin(), codes.elevations.end());
   EXPECT_EQ(*low, 0.0);
   EXPECT_EQ(*high, 65535.0);
-  const json unreal = exported({folder_ / "c.r16", "--z-scale", "0.0078125", "--z-offset", "-256", "--clamp-range"});
+  const json unreal =
+      exported({folder_ / "c.r16", "--raw-scale", "0.0078125", "--raw-offset", "-256", "--clamp-range"});
   EXPECT_EQ(unreal.at("z_scale"), 0.0078125);
   EXPECT_GT(unreal.at("clamped"), 0);
-  // Of a scale that is too small: the number that would be stored, and a scale that does.
-  const std::string too_small = refused({folder_ / "d.r16", "--z-scale", "0.0078125", "--z-offset", "-256"});
-  EXPECT_THAT(too_small, HasSubstr(" is at elevation "));
-  EXPECT_THAT(too_small, HasSubstr(", which uint16 does not hold; --clamp-range moves it"));
-  const std::size_t from = too_small.find("--z-scale ");
-  ASSERT_NE(from, std::string::npos) << too_small;
-  const std::string scale = too_small.substr(from + 10, too_small.find(' ', from + 10) - from - 10);
-  const json would_do = exported({folder_ / "e.r16", "--z-scale", scale, "--z-offset", "-256"});
-  EXPECT_EQ(would_do.at("clamped"), 0);
-  EXPECT_THAT(refused({folder_ / "d.exr", "--type", "f16", "--z-scale", "0.0001", "-q"}),
-              HasSubstr("--type f32 holds it"));
+  // Of a scale that is too small: the number that would be stored, and what a scale must hold.
+  const std::string too_small = refused({folder_ / "d.r16", "--raw-scale", "0.0078125", "--raw-offset", "-256"});
+  EXPECT_THAT(too_small, HasSubstr(" (elevation 265."));
+  EXPECT_THAT(too_small,
+              HasSubstr("), which uint16 does not hold; use --clamp-range, --method barycentric, --raw-scale "
+                        "or another --type (elevations are -1 to 855.5)"));
   EXPECT_THAT(refused({folder_ / "d.raw", "--type", "f32"}),
               HasSubstr(".r16 and .raw store one channel of uint16, not 1 of float32; .r32 does"));
   EXPECT_EQ(exported({folder_ / "u.exr", "--type", "u32", "--clamp-range"}).at("sample_type"), "uint32");
@@ -269,7 +265,7 @@ TEST_F(ExportCommand, KeepsOldTilesWhereALaterOneFails) {
   for (const std::string& name : names) {
     if (name.ends_with(".npy")) before[name] = read_file(folder_ / name);
   }
-  again.insert(again.end(), {"--z-scale", "2"});
+  again.insert(again.end(), {"--raw-scale", "2"});
   EXPECT_THAT(refused(again, 1), HasSubstr("t_x140_y0.npy"));
   EXPECT_EQ(folder_.names(), names);
   for (const auto& [name, bytes] : before) EXPECT_TRUE(read_file(folder_ / name) == bytes) << name;
@@ -278,7 +274,7 @@ TEST_F(ExportCommand, KeepsOldTilesWhereALaterOneFails) {
 TEST_F(ExportCommand, RefusesASampleTypeBeforeItWarnsOfAnything) {
   const RunResult result = run_isohf({"export", folder_ / "coast.isohf", folder_ / "t.exr", "--type", "u16"});
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.err, testing::StartsWith("isohf: " + folder_ / "t.exr" + ": "));
+  EXPECT_THAT(result.err, testing::StartsWith("isohf export: " + folder_ / "t.exr" + ": "));
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
 }
 
@@ -301,7 +297,7 @@ TEST(ExportWithoutAPlace, PutsTilesAndGridsBesideEachOther) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return json::parse(result.out, nullptr, false);
   };
-  (void)done({"convert", peaks, folder / "whole.isohf", "--sample-spacing", "2", "--tiles", "2x2", "--json"});
+  (void)done({"convert", peaks, folder / "whole.isohf", "--sample-spacing", "2", "--json"});
   for (const std::string ending : {".asc", ".flt", ".r16", ".tif", ".png"}) {
     SCOPED_TRACE(ending);
     (void)done({"export", folder / "whole.isohf", folder / ("whole" + ending), "--json"});
@@ -319,7 +315,7 @@ TEST(ExportVoids, AreToldWhereAFileOfNumbersAloneHoldsThem) {
   ASSERT_EQ(run_isohf({"convert", kVoids, folder / "a.isohf", "-q"}).exit_code, 0);
   const RunResult written = run_isohf({"export", folder / "a.isohf", folder / "a.r16", "--method", "hex"});
   EXPECT_EQ(written.exit_code, 0) << written.err;
-  EXPECT_NE(written.err.find("voids are written as 65535"), std::string::npos) << written.err;
+  EXPECT_NE(written.err.find("nodata samples are written as 65535"), std::string::npos) << written.err;
 }
 
 }  // namespace

@@ -79,7 +79,7 @@ class ExportLike : public testing::Test {
         options.input += line.str();
       }
     }
-    const RunResult result = run_isohf({"sample", folder / "a.isohf", "--lonlat"}, options);
+    const RunResult result = run_isohf({"sample", folder / "a.isohf", "--in", "lonlat"}, options);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     std::vector<float> heights;
     std::istringstream lines(result.out);
@@ -175,7 +175,7 @@ TEST_F(ExportLike, BytesDoNotDependOnThreads) {
 TEST_F(ExportLike, SaysInWordsAndJsonWhereTheSamplesLie) {
   convert("wide.flt", "utm");
   EXPECT_EQ(run("said.tif", {"--like", folder / "wide.flt"}).out,
-            folder / "said.tif" + ": 240 x 160 samples of float32, 0.05 x 0.05 apart\n");
+            "raster       " + folder / "said.tif" + ": 240 x 160 samples of float32\nspacing      0.05 x 0.05\n");
   const json said = json::parse(run("json.tif", {"--like", folder / "wide.flt", "--json"}).out);
   EXPECT_EQ(said.at("method"), "barycentric");
   EXPECT_EQ(said.at("width"), 240);

@@ -65,7 +65,7 @@ class ExportAsSource : public testing::Test {
   void expect_refused(const RunResult& result, int exit_code, const std::string& part) const {
     EXPECT_EQ(result.exit_code, exit_code);
     EXPECT_EQ(result.out, "");
-    EXPECT_THAT(result.err, testing::StartsWith("isohf: "));
+    EXPECT_THAT(result.err, testing::StartsWith("isohf export: "));
     EXPECT_THAT(result.err, HasSubstr(part));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
     for (const std::string& name : folder.names()) EXPECT_FALSE(name.ends_with(".part")) << name;
@@ -197,9 +197,10 @@ TEST_F(ExportAsSource, ExactSamplesGoIntoEveryFormatThatHoldsThem) {
           << i;
     }
   }
-  expect_refused(run("back.png"), 2, "is -32768 (void), which uint16 does not hold; write .tif");
+  expect_refused(run("back.png"), 2,
+                 "is -32768 (nodata), which uint16 does not hold; use another format or --type, or --surface");
   convert(kRidges, {"--lossless"});
-  expect_refused(run("back.png"), 2, "which uint16 does not hold; write .tif");
+  expect_refused(run("back.png"), 2, "which uint16 does not hold; use another format");
 }
 
 TEST_F(ExportAsSource, WhatOvershootsTheSourcesOwnTypeIsMovedToItsEndsWithAWord) {
@@ -207,10 +208,10 @@ TEST_F(ExportAsSource, WhatOvershootsTheSourcesOwnTypeIsMovedToItsEndsWithAWord)
   convert(folder / "stripes.png", {"--filter", "bspline3", "--z-scale", "0.5", "--z-offset", "-100"});
   const RunResult clamped = run("back.png");
   EXPECT_EQ(clamped.exit_code, 0) << clamped.err;
-  EXPECT_THAT(clamped.err, HasSubstr("back.png: the surface overshoots the uint8 of its source at "));
+  EXPECT_THAT(clamped.err, HasSubstr(" samples of the surface overshoot the uint8 of its source and were clamped"));
   EXPECT_EQ(run("back.png", {"--overwrite", "--clamp-range"}).err, "") << "it was asked for";
   convert(folder / "stripes.png", {"--filter", "bspline3"});
-  EXPECT_THAT(clamped.out, HasSubstr("moved into the range"));
+  EXPECT_THAT(clamped.out, HasSubstr("clamped      "));
   EXPECT_EQ(run("back.png", {"--overwrite"}).exit_code, 0);
   const Raster back = read_raster(folder / "back.png");
   // No void value takes a number away from a raster without voids.
@@ -223,12 +224,9 @@ TEST_F(ExportAsSource, WhatOvershootsTheSourcesOwnTypeIsMovedToItsEndsWithAWord)
 TEST_F(ExportAsSource, SamplesThatAnotherTypeDoesNotHoldAreRefusedWithARemedy) {
   write_stripes(folder / "stripes.tif", SampleType::kInt16);
   convert(folder / "stripes.tif");
-  expect_refused(run("back.png"), 2, "which uint16 does not hold; --clamp-range moves it");
-  expect_refused(run("back.png"), 2, ", --method barycentric does not overshoot, .exr holds it");
+  expect_refused(run("back.png"), 2, "which uint16 does not hold; use --clamp-range, --method barycentric");
   EXPECT_EQ(run("back.png", {"--clamp-range"}).exit_code, 0);
-  // No overshoot: the elevations themselves go beyond.
-  expect_refused(run("b.tif", {"--type", "u8", "--z-scale", "0.5"}), 2,
-                 "uint8 does not hold; --clamp-range moves it (elevations run from ");
+  expect_refused(run("b.tif", {"--type", "u8", "--raw-scale", "0.5"}), 2, " (elevations are ");
 }
 
 TEST_F(ExportAsSource, TypeIsThatOfTheSamples) {
@@ -256,7 +254,7 @@ TEST_F(ExportAsSource, TypeIsThatOfTheSamples) {
       std::vector<std::byte>(128, std::byte{0xFF}));
   convert(folder / "low.tif", {"--lossless"});
   expect_refused(run("none.tif", {"--type", "u8"}), 2,
-                 "is -1, which uint8 does not hold; without --type it is int16, as in the source");
+                 "is -1, which uint8 does not hold; use another format or --type");
 }
 
 TEST_F(ExportAsSource, SaysThatTheArchiveComesFirst) {
@@ -346,10 +344,9 @@ TEST_F(ExportAsSource, VoidsByRangeNeverComeBackAsElevationsWithoutAWord) {
   // As kept, bit for bit, told also where little is told; another type has one value for all of them.
   const RunResult kept = run("kept.tif", {"-q"});
   EXPECT_EQ(kept.exit_code, 0);
-  EXPECT_EQ(kept.err,
-            "isohf: warning: " + (folder / "kept.tif") +
-                ": 2048 samples lie outside -10 to 200, which meant no elevation: a reader must be told, as with "
-                "--valid-range; --method hex writes one void value\n");
+  EXPECT_EQ(kept.err, "isohf export: warning: " + (folder / "kept.tif") +
+                          ": 2048 samples are outside -10 to 200, which meant nodata and is not declared; read it with "
+                          "--valid-range, or write one nodata value by --surface\n");
   EXPECT_EQ(run("strict.tif", {"--strict"}).exit_code, 1);
   EXPECT_FALSE(std::filesystem::exists(folder / "strict.tif"));
   const Raster wider = exported("wider.flt");

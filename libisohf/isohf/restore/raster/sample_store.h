@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -32,6 +33,7 @@ class SampleStore {
 
   /// Writes size_bytes(type) bytes at `raw`, none where it refuses. NaN is nodata.
   Outcome store(double elevation, std::byte* raw) const;
+  [[nodiscard]] const SampleMapping& mapping() const { return mapping_; }
   /// Whether a raw number is one of the type, exactly.
   [[nodiscard]] bool holds(double raw) const;
 
@@ -49,6 +51,33 @@ class SampleStore {
   Clamp clamp_;
   double low_;  ///< smallest and largest raw number that is an elevation
   double high_;
+};
+
+/// The raster whose samples are stored, for messages.
+struct StoredRaster {
+  std::string path;
+  std::int64_t width = 0;
+  std::string remedy;  ///< for a sample that its type does not hold
+};
+
+/// Throws Error{kInvalidArgument} for a sample that the raster's type does not hold, by its number from 0 on.
+[[noreturn]] void refuse_sample(const StoredRaster& raster, SampleType type, std::int64_t sample,
+                                const std::string& value);
+
+/// Rows of elevations, NaN for nodata, into raw rows of a raster.
+class RowStore {
+ public:
+  RowStore(const SampleStore& store, StoredRaster raster) : store_(store), raster_(std::move(raster)) {}
+
+  /// Throws Error{kInvalidArgument} as refuse_sample.
+  [[nodiscard]] std::vector<std::byte> raw_rows(std::int64_t first_row, std::span<const double> elevations);
+  /// Of all rows so far.
+  [[nodiscard]] const SampleStore::Result& counts() const { return counts_; }
+
+ private:
+  SampleStore store_;
+  StoredRaster raster_;
+  SampleStore::Result counts_;
 };
 
 /// Raw samples of a record in another type, number for number; those that are void as `nodata`, where that is given.

@@ -1,5 +1,6 @@
-#include "isohf/restore/sample_store.h"
+#include "isohf/restore/raster/sample_store.h"
 
+#include <fmt/format.h>
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
 
@@ -10,6 +11,7 @@
 
 #include "isohf/base/assert.h"
 #include "isohf/base/sample.h"
+#include "isohf/error.h"
 
 namespace isohf {
 std::optional<double> usual_nodata(SampleType type) {
@@ -75,6 +77,30 @@ SampleStore::Result SampleStore::store(std::span<const double> elevations, std::
   const auto refused = std::find(outcomes.begin(), outcomes.end(), Outcome::kRefused);
   if (refused != outcomes.end()) result.refused = static_cast<std::size_t>(refused - outcomes.begin());
   return result;
+}
+
+void refuse_sample(const StoredRaster& raster, SampleType type, std::int64_t sample, const std::string& value) {
+  throw Error(ErrorCode::kInvalidArgument,
+              {raster.path,
+               fmt::format("sample (column {}, row {}) is {}, which {} does not hold", sample % raster.width,
+                           sample / raster.width, value, to_string(type)),
+               "", raster.remedy});
+}
+
+std::vector<std::byte> RowStore::raw_rows(std::int64_t first_row, std::span<const double> elevations) {
+  const SampleMapping& mapping = store_.mapping();
+  std::vector<std::byte> raw(elevations.size() * size_bytes(mapping.type));
+  const SampleStore::Result result = store_.store(elevations, raw);
+  counts_.nodata += result.nodata;
+  counts_.clamped += result.clamped;
+  if (result.refused) {
+    const double elevation = elevations[*result.refused];
+    std::string value = std::isnan(elevation) ? "nodata" : fmt::format("{:.9g}", elevation);
+    if (!std::isnan(elevation) && (mapping.z_scale != 1.0 || mapping.z_offset != 0.0))
+      value = fmt::format("{:.9g} (elevation {})", (elevation - mapping.z_offset) / mapping.z_scale, value);
+    refuse_sample(raster_, mapping.type, first_row * raster_.width + static_cast<std::int64_t>(*result.refused), value);
+  }
+  return raw;
 }
 
 std::optional<std::size_t> convert_exactly(const LosslessRecord& record, std::span<const std::byte> raw,
