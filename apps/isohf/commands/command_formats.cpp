@@ -3,15 +3,15 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <nlohmann/json.hpp>
-#include <optional>
+#include <algorithm>
+#include <string_view>
 
 #include "commands/command.h"
 #include "formats/readers.h"
 #include "formats/registry.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/error.h"
-#include "output/json_output.h"
+#include "output/report.h"
 #include "output/standard_output.h"
 
 namespace isohf::cli {
@@ -20,75 +20,63 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kFormatsFooter =
-    R"(Inputs are recognised by their first bytes; the extension decides only where a format has no signature.
-Every input takes --registration, --nodata, --valid-range, --fill, --z-scale, --z-offset and
---sample-spacing.
-
-Examples:
-  isohf formats
-  isohf formats --json)";
-
-/// Formats that the OpenImageIO module reads, or why there are none.
-struct OtherFormats {
-  std::optional<OiioFormats> formats;
-  std::string why_none;
-};
-
-OtherFormats other_formats() {
-  OtherFormats other;
-  try {
-    other.formats = oiio_formats();
-  } catch (const Error& error) {
-    other.why_none = error.what();
-  }
-  return other;
-}
-
-ordered_json list_of(const Format& format) {
-  return {{"name", format.name},
-          {"extensions", format.extensions},
-          {"library", library_of(format)},
-          {"note", format.note.empty() ? ordered_json(nullptr) : ordered_json(format.note)}};
-}
+    R"(Inputs are recognised by their first bytes, and by the extension if the format has no signature. --json also
+lists libraries and their versions.)";
 
 ordered_json list_of(const std::vector<Format>& formats) {
   ordered_json list = ordered_json::array();
-  for (const Format& format : formats) list.push_back(list_of(format));
+  for (const Format& format : formats) {
+    list.push_back({{"name", format.name},
+                    {"extensions", format.extensions},
+                    {"library", library_of(format)},
+                    {"note", format.note.empty() ? ordered_json(nullptr) : ordered_json(spelled(format.note))}});
+  }
   return list;
 }
 
-ordered_json list_of(const OtherFormats& other) {
-  if (!other.formats) return {{"present", false}, {"why", other.why_none}};
-  return {{"present", true}, {"library", other.formats->library}, {"extensions", other.formats->extensions}};
-}
-
-std::string text_from(const char* heading, const std::vector<Format>& formats) {
-  std::string text = std::string(heading) + "\n";
-  for (const Format& format : formats) {
-    text += fmt::format("  {:<26} {:<16} {:<30} {}", format.name, library_of(format),
-                        fmt::format("{}", fmt::join(format.extensions, " ")), format.note);
-    text.erase(text.find_last_not_of(' ') + 1);
-    text += '\n';
+/// A format that is written goes with the reader that has its extensions.
+std::string table() {
+  std::string text = fmt::format("{:<24} {:<10} {:<32} {}\n", "FORMAT", "USE", "EXTENSIONS", "NOTES");
+  for (const Format& format : native_formats()) {
+    const auto is_read = [&](std::string_view extension) {
+      return std::ranges::find(format.extensions, extension) != format.extensions.end();
+    };
+    std::vector<std::string> notes;
+    if (!format.note.empty()) notes.push_back(format.note);
+    bool is_written = false;
+    for (const Format& other : writable_formats()) {
+      if (!std::ranges::all_of(other.extensions, is_read)) continue;
+      is_written = true;
+      notes.push_back("writes " + other.note);
+    }
+    const std::string row = fmt::format("{:<24} {:<10} {:<32} {}", format.name, is_written ? "read,write" : "read",
+                                        fmt::format("{}", fmt::join(format.extensions, " ")), fmt::join(notes, "; "));
+    text += row.substr(0, row.find_last_not_of(' ') + 1) + "\n";
   }
-  return text;
-}
-
-std::string text_from(const OtherFormats& other) {
-  if (!other.formats) return "Read through OpenImageIO: nothing; " + other.why_none + "\n";
-  return fmt::format("Read through {}, also photos for --texture\n  {}\n", other.formats->library,
-                     fmt::join(other.formats->extensions, " "));
+  return spelled(text);
 }
 
 int run(const Common& common) {
-  const OtherFormats other = other_formats();
-  StandardOutput out(common);
-  if (common.json) {
-    out.write(json_text({{"read", list_of(native_formats())},
-                         {"read_by_module", list_of(other)},
-                         {"written", list_of(writable_formats())}}));
-  } else if (!common.quiet) {
-    out.write(text_from("Read", native_formats()) + text_from(other) + text_from("Written", writable_formats()));
+  Report report;
+  report.add("read", list_of(native_formats()));
+  std::string more;
+  try {
+    const OiioFormats other = oiio_formats();
+    report.add("read_by_module", {{"present", true}, {"library", other.library}, {"extensions", other.extensions}});
+    more = common.verbose
+               ? fmt::format("{} reads {}\n", other.library, fmt::join(other.extensions, " "))
+               : fmt::format("{} reads {} more extensions; -v lists them\n", other.library, other.extensions.size());
+  } catch (const Error& error) {
+    report.add("read_by_module", {{"present", false}, {"why", error.what()}});
+    more = std::string("OpenImageIO reads nothing: ") + error.what() + "\n";
   }
+  report.add("written", list_of(writable_formats()));
+  if (common.json || common.quiet) {
+    report.print(common);
+    return kExitDone;
+  }
+  StandardOutput out(common);
+  out.write(table() + more);
   out.finish();
   return kExitDone;
 }
