@@ -11,12 +11,12 @@ namespace isohf::cli {
 
 std::string what_else(const std::string& path) {
   if (const Format* const format = native_format_of(path, {}); format != nullptr) {
-    return fmt::format("is no isohf archive but a raster ({0}); isohf convert {1} -o OUT.isohf makes one", format->name,
-                       path);
+    return fmt::format("is not an isohf archive but a raster ({0}). Convert it first: isohf convert {1} OUT.isohf",
+                       format->name, path);
   }
   const ForeignFile found = foreign_file(path);
   if (found.is.empty() || found.is == "an isohf archive" || found.is == "a ZIP file") return {};
-  return "is no isohf archive but " + found.is;
+  return "is not an isohf archive but " + found.is;
 }
 
 ArchiveReader open_archive(const std::string& path, ArchiveReader::Shards shards) {
@@ -25,7 +25,7 @@ ArchiveReader open_archive(const std::string& path, ArchiveReader::Shards shards
     try {
       understand_world(archive);
     } catch (const Error&) {
-      // Whoever needs a place says that it is not understood.
+      // Reported by whatever needs a place.
     }
     return archive;
   } catch (const Error& error) {

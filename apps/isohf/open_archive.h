@@ -6,16 +6,14 @@
 
 namespace isohf::cli {
 
-/// Opens an archive. Of a file that is none the error says what it is instead, and which command would help.
+/// Opens an archive. The error for another file names its kind, and the command that would help.
 [[nodiscard]] ArchiveReader open_archive(const std::string& path,
                                          ArchiveReader::Shards shards = ArchiveReader::Shards::kRefused);
 
-/// The same, and has the map understood that its source lies on where it was projected from one: what is made of the
-/// archive then ends with the source.
+/// The same; if the source was projected from a map, that is understood: what is made of the archive ends with it.
 [[nodiscard]] ArchiveReader open_with_source(const std::string& path);
 
-/// What a file is that is no archive, and what would help; empty where it may be an archive that is damaged. Throws
-/// Error{kIo}.
+/// What a file is instead of an archive, and what would help; empty if it may be a damaged archive. Throws Error{kIo}.
 [[nodiscard]] std::string what_else(const std::string& path);
 
 }  // namespace isohf::cli

@@ -8,13 +8,11 @@
 
 namespace isohf::cli {
 
-/// The threads that -j asks for, while it lives: also for arenas that the library makes.
+/// An Arena of -j's threads, for work with a result; 0 threads are one a core.
 class WorkArena {
  public:
-  /// threads  0 for one a core
-  explicit WorkArena(int threads) : arena_(job_of(threads)) {}
+  explicit WorkArena(int threads) : arena_(Job{.threads = threads}) {}
 
-  /// Works on those threads.
   template <typename Work>
   auto execute(Work work) {
     if constexpr (std::is_void_v<decltype(work())>) {
@@ -27,12 +25,6 @@ class WorkArena {
   }
 
  private:
-  static Job job_of(int threads) {
-    Job job;
-    job.threads = threads;
-    return job;
-  }
-
   Arena arena_;
 };
 

@@ -12,26 +12,12 @@
 namespace isohf::cli {
 namespace {
 
-[[noreturn]] void refuse(const std::string& output, const std::string& kind, const std::string& remedy) {
-  throw Error(ErrorCode::kInvalidArgument, {output, "exists and is " + kind, "", remedy});
-}
-
-template <typename Look>
-auto named(const std::string& output, Look look) {
-  try {
-    return look();
-  } catch (const Error& error) {
-    throw error.within(output);
-  }
-}
-
-/// What a file is that somebody was about to lose.
+/// What kind of file would be lost.
 std::string kind_of(const std::string& path) {
   const Format* found = nullptr;
   try {
     found = native_format_of(path, {});
-  } catch (const Error&) {
-    // What cannot be looked into is told to be nothing of ours.
+  } catch (const Error&) {  // not a file of ours
   }
   return found != nullptr ? std::string("a raster (") + found->name + ")" : "no isohf archive";
 }
@@ -43,11 +29,11 @@ bool is_archive_name(const std::string& name) {
 }
 
 void check_archive_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite) {
-  const std::string place = check_output_place(inputs, output);
-  if (named(output, [&] { return !head_of_file(place, 1).empty() && !is_archive_file(place); })) {
-    refuse(output, kind_of(place), "an archive replaces only archives, choose another name");
-  }
-  check_output_file(inputs, output, overwrite);
+  check_output_file(inputs, output, overwrite, [&](const std::string& place) {
+    if (head_of_file(place, 1).empty() || is_archive_file(place)) return;
+    throw Error(ErrorCode::kInvalidArgument,
+                {"", "exists and is " + kind_of(place), "", "an archive replaces only archives, choose another name"});
+  });
 }
 
 void check_raster_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite) {
@@ -56,7 +42,7 @@ void check_raster_output(const std::vector<std::string>& inputs, const std::stri
     also_written.push_back(sidecar);
     also_written.push_back(sidecar + ".part");
   }
-  static_cast<void>(check_output_place(inputs, output, std::move(also_written)));
+  check_output_file(inputs, output, true, {}, std::move(also_written));
   check_raster_target(output, overwrite);
 }
 
