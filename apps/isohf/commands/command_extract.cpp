@@ -1,4 +1,4 @@
-/// isohf extract: some tiles of an archive as one of their own.
+/// isohf extract: cuts tiles out of an archive.
 
 #include <fmt/format.h>
 
@@ -21,14 +21,13 @@ namespace isohf::cli {
 namespace {
 
 constexpr const char* kExtractFooter =
-    R"(The result is an archive like any other. Tiles and textures are copied as they are, and every place keeps its
-elevation; overviews, shadow seeds and statistics are made from them. Residuals are left out. The tiles of an
-overview become an archive without textures and seeds.
+    R"(OUTPUT is an archive like any other. Tiles and textures are copied; overviews, shadow seeds and statistics are
+made from them. Residuals of --lossless are left out. An extract of an overview has no textures and seeds.
 
 Examples:
-  isohf extract land.isohf -o valley.isohf --bbox 6.5,45,7,45.5
-  isohf extract land.isohf -o north.isohf --tiles 0:40,0:12       columns 0 to 39, rows 0 to 11
-  isohf extract land.isohf -o afar.isohf --overview 2               all of it, of every 64th vertex)";
+  isohf extract land.isohf valley.isohf --bbox 6.5,45,7,45.5
+  isohf extract land.isohf north.isohf --tiles 0:40,0:12      columns 0 to 39, rows 0 to 11
+  isohf extract land.isohf small.isohf --overview 2           all of it, every 64th vertex)";
 
 struct ExtractCommand {
   const Common& common;
@@ -43,13 +42,13 @@ struct ExtractCommand {
 
 int run(const ExtractCommand& options) {
   check_archive_output({options.archive}, options.output, options.overwrite);
-  const TileRange tiles = options.tiles ? *options.tiles : [&] {
-    ArchiveReader archive = open_archive(options.archive);
-    const TileRange here = plane_tiles_of(archive, options.overview);
-    if (!options.bbox) return here;
+  ArchiveReader archive = open_archive(options.archive);
+  TileRange tiles = plane_tiles_of(archive, options.overview);
+  if (options.tiles) tiles = *options.tiles;
+  if (options.bbox) {
     const TileGrid grid = archive.metadata().plane_grid(options.overview);
-    return tiles_touching(grid, ground_in_box(archive, *options.bbox, AcrossEnds::kRefused));
-  }();
+    tiles = tiles_touching(grid, ground_in_box(archive, *options.bbox, AcrossEnds::kRefused));
+  }
   return print_part(options.output, options.common, options.work, [&](const Job& job) {
     return extract_tiles(options.archive, options.output, options.overview, tiles,
                          {options.overwrite, options.common.strict}, job);
@@ -65,18 +64,18 @@ Run add_extract(CLI::App& line, Common& common) {
   positional(line, "OUTPUT,-o,--output", "Archive to write", options.output);
   line.add_flag("--overwrite", options.overwrite, "Replace OUTPUT if it exists");
   group(line, "Tiles (at least one)");
-  option(line, "--bbox", "W,S,E,N", "Tiles that touch this rectangle, in the units of the source's reference system",
+  option(line, "--bbox", "W,S,E,N", "Take tiles that touch this rectangle, in the source's coordinates",
          [&options](const std::string& text) { options.bbox = bounding_box_from_string(text); });
-  option(line, "--tiles", "A:B,C:D", "Columns A to B-1 and rows C to D-1 of tiles, from 0 in the North-West",
+  option(line, "--tiles", "A:B,C:D", "Take columns A to B-1 and rows C to D-1 of tiles, from 0 in the North-West",
          [&options](const std::string& text) { options.tiles = parse_tile_range(text); });
-  option(line, "--overview", "K", "Tiles of overview K, from 1 on: all, or those of --bbox or --tiles",
+  option(line, "--overview", "K", "Take tiles of overview K, from 1 on: all, or those of --bbox or --tiles",
          [&options](const std::string& text) { options.overview = static_cast<int>(parse_whole_number(text, 1, 64)); });
   exclusive(line, {"--bbox", "--tiles"});
   add_work_options(line, options.work, common);
   line.footer(kExtractFooter);
   return [kept] {
     if (!kept->bbox && !kept->tiles && kept->overview == 0) {
-      throw Error(ErrorCode::kInvalidArgument, "no tiles chosen; give --bbox W,S,E,N, --tiles A:B,C:D or --overview K");
+      throw Error(ErrorCode::kInvalidArgument, "no tiles chosen. Use --bbox W,S,E,N, --tiles A:B,C:D or --overview K");
     }
     return run(*kept);
   };

@@ -18,12 +18,12 @@ namespace isohf::cli {
 namespace {
 
 constexpr const char* kMergeFooter =
-    R"(The archive has the bytes of a single run. Every shard is read and checked before anything is written, and all that
-is wrong is printed at once.
+    R"(The archive has the bytes of a single run. All shards are checked before anything is written, and all problems
+are printed at once.
 
 Examples:
-  isohf merge part-*.isohf -o land.isohf     the shards of isohf convert --shard
-  isohf merge part-*.isohf --missing         which shards are to be made (again))";
+  isohf merge part-*.isohf -o land.isohf     join the shards of isohf convert --shard
+  isohf merge part-*.isohf --missing         list the shards to make (again))";
 
 struct MergeCommand {
   const Common& common;
@@ -34,24 +34,21 @@ struct MergeCommand {
   bool overwrite = false;
 };
 
-/// An empty line if none is missing.
+/// As Slurm's --array reads them: an empty line if none is missing.
 int print_missing(const MergeCommand& options) {
   ProgressDisplay display(options.common, options.work.progress);
   const MissingShards missing = missing_shards(options.shards, job_from(options.work, display));
   display.clear();
   StandardOutput out(options.common);
-  if (options.common.json) {
-    out.write(json_text({{"shards", missing.count}, {"missing", missing.numbers}}));
-  } else {
-    out.write(shard_list(missing.numbers) + "\n");
-  }
+  out.write(options.common.json ? json_text({{"shards", missing.count}, {"missing", missing.numbers}})
+                                : shard_list(missing.numbers) + "\n");
   out.finish();
   return kExitDone;
 }
 
 int run(const MergeCommand& options) {
   if (options.missing) return print_missing(options);
-  if (options.output.empty()) throw Error(ErrorCode::kInvalidArgument, "no OUTPUT given (-o), nor --missing");
+  if (options.output.empty()) throw Error(ErrorCode::kInvalidArgument, "no OUTPUT given. Use -o OUTPUT, or --missing");
   check_archive_output(options.shards, options.output, options.overwrite);
   return print_part(options.output, options.common, options.work, [&](const Job& job) {
     return merge_shards(options.shards, options.output, {options.overwrite, options.common.strict}, job);

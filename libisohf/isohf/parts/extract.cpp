@@ -230,8 +230,8 @@ TileRange tiles_touching(const TileGrid& grid, const WorldBounds& bounds) {
 TileRange plane_tiles_of(const ArchiveReader& archive, int plane) {
   const Metadata& metadata = archive.metadata();
   if (plane < 0 || plane > metadata.planes.count) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("{}: has {} coarse planes, plane {} is asked for",
-                                                         archive.path(), metadata.planes.count, plane));
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: has {} overviews, not an overview {}", archive.path(), metadata.planes.count, plane));
   }
   const TileGrid grid = metadata.plane_grid(plane);
   return {{0, 0}, {grid.tile_columns(), grid.tile_rows()}};
