@@ -150,16 +150,16 @@ class GeographicCombinations : public testing::Test {
   /// `hole` is the middle of the void and `clear` degrees around it are not looked at.
   void samples_hold(const Combination& at, const std::vector<GeoPoint>& places, const GeoPoint& hole) {
     for (const GeoPoint& place : places) {
-      const RunResult sampled = run_isohf({"sample", folder / "a.isohf", "--at-lonlat", std::to_string(place.longitude),
-                                           std::to_string(place.latitude)});
+      const RunResult sampled = run_isohf({"sample", folder / "a.isohf", "--in", "lonlat", "--at",
+                                           std::to_string(place.longitude) + "," + std::to_string(place.latitude)});
       ASSERT_EQ(sampled.exit_code, 0) << sampled.err;
       ASSERT_TRUE(sampled.out.find_first_of("0123456789") == 0 || sampled.out[0] == '-')
           << sampled.out << place.longitude << " " << place.latitude;
       EXPECT_NEAR(std::stod(sampled.out), expected(at, place.longitude, place.latitude), tolerance)
           << place.longitude << " " << place.latitude;
     }
-    const RunResult sampled = run_isohf(
-        {"sample", folder / "a.isohf", "--at-lonlat", std::to_string(hole.longitude), std::to_string(hole.latitude)});
+    const RunResult sampled = run_isohf({"sample", folder / "a.isohf", "--in", "lonlat", "--at",
+                                         std::to_string(hole.longitude) + "," + std::to_string(hole.latitude)});
     if (!at.fill) {
       EXPECT_EQ(sampled.out, "void\n");
     } else {
@@ -202,7 +202,7 @@ class GeographicCombinations : public testing::Test {
   void exports_hold(const Combination& at, const std::function<bool(double, double)>& inside) {
     const Metadata metadata = ArchiveReader(folder / "a.isohf").metadata();
     const bool warped = at.kind != "none" && metadata.projection->spec.kind != ProjectionKind::kEquirectangular;
-    for (const Words& more : {Words{}, Words{"--z-scale", "1"}, Words{"--to-crs", "none"}}) {
+    for (const Words& more : {Words{}, Words{"--raw-scale", "1"}, Words{"--to-crs", "none"}}) {
       const RunResult made = run_with({"export", folder / "a.isohf", folder / "a.tif", "--overwrite"}, more);
       ASSERT_EQ(made.exit_code, 0) << made.err;
       EXPECT_EQ(made.err, "");

@@ -97,7 +97,7 @@ def projections(isohf, folder):
             far, count = worst(folder / "a.tif", text, middle, axis)
             check(far <= NEAR and count > 100, f"--to-crs {text}: off by {far} m at {count} samples")
             for lon, lat in (middle, (7.21, 46.61), (7.19, 46.592)):
-                at = isohf.must("sample", archive, "--at-lonlat", lon, lat).stdout.split()
+                at = isohf.must("sample", archive, "--in", "lonlat", "--at", f"{lon},{lat}").stdout.split()
                 off = abs(float(at[0]) - plane(lon, lat, middle, axis))
                 check(off <= NEAR, f"--to-crs {text}: {lon} {lat} is off by {off} m")
                 isohf.must("shade", archive, "-o", folder / "a.png", "--overwrite", "-q") if lon == 7.21 else None
@@ -150,9 +150,9 @@ def globes(isohf, folder):
         for options in (["--to-crs", "none"], ["--to-crs", "equirectangular"]):
             isohf.must("convert", folder / "globe.tif", "-o", folder / "g.isohf", "--overwrite", "-q", *options)
             for lon in (200.5, 100.5):
-                said = isohf.must("sample", folder / "g.isohf", "--at-lonlat", lon, 3, "--with-crs").stdout.split()
+                said = isohf.must("sample", folder / "g.isohf", "--in", "lonlat", "--at", f"{lon},3", "--with", "crs").stdout.split()
                 own = west + (lon - west) % 360.0
-                check(abs(float(said[-2]) - own) < 1e-6, f"--with-crs says {said[-2]} for {own}, from {west} on")
+                check(abs(float(said[-2]) - own) < 1e-6, f"--with crs says {said[-2]} for {own}, from {west} on")
     write(folder / "across.tif", "EPSG:4326", 180.0, 10.0, 30.0, (180.0, 10.0), 0)
     isohf.refuses("its edge runs through it", "convert", folder / "across.tif", "-o", folder / "n.isohf", "--to-crs",
                   "+proj=moll +datum=WGS84")
@@ -215,7 +215,7 @@ def joined(isohf, folder):
             check(far <= NEAR and count > 200, f"joined by {text}: off by {far} m at {count} samples")
             isohf.must("verify", archive, "--against", pair[0], "--against", pair[1], "-q")
             for lon in (11.97, 12.0, 12.03):
-                at = isohf.must("sample", archive, "--at-lonlat", lon, 46.6).stdout.split()
+                at = isohf.must("sample", archive, "--in", "lonlat", "--at", f"{lon},46.6").stdout.split()
                 off = abs(float(at[0]) - plane(lon, 46.6, middle, axis))
                 check(off <= NEAR, f"joined by {text}: {lon} is off by {off} m")
         # Files of the map that they are joined on keep their samples.
@@ -325,7 +325,7 @@ def samples(isohf, folder):
 
     decimals = numpy.round(numpy.linspace(100.0, 220.0, 1600).reshape(40, 40), 2)
     kept("d.tif", decimals, gdal.GDT_Float64)
-    isohf.refuses("which float32 does not hold; write .tif", "export", folder / "k.isohf", folder / "d.exr")
+    isohf.refuses("which float32 does not hold; use another format", "export", folder / "k.isohf", folder / "d.exr")
     tenths = numpy.arange(1600, dtype=numpy.int16).reshape(40, 40)
     tenths[3, 4] = -32768
     kept("t.tif", tenths, gdal.GDT_Int16, 0.1, -32768)
@@ -365,7 +365,7 @@ def turns(isohf, folder):
         check(numpy.array_equal(gdal.Open(str(folder / "back.tif")).ReadAsArray(), gdal.Open(str(folder / "g.tif")).ReadAsArray()[:, :columns]),
               f"{text}: samples differ")
         for longitude in (180.0, -179.5, 179.5, 0.0, 0.5, -0.5, 90.0, 200.0):
-            height = float(isohf.must("sample", folder / "g.isohf", "--at-lonlat", str(longitude), "1").stdout.split()[0])
+            height = float(isohf.must("sample", folder / "g.isohf", "--in", "lonlat", "--at", f"{longitude},1").stdout.split()[0])
             check(abs(height - 1000 * math.cos(math.radians(longitude))) < 2, f"{text}: {height} at longitude {longitude}")
         isohf.refuses("leave one of them out", "convert", folder / "g.tif", "-o", folder / "n.isohf", "--wrap-x", "--to-crs", "equirectangular")
     write(folder / "u.tif", "EPSG:32632", 9.0, 46.0, 30.0, (9.0, 46.0), 0, 40)
