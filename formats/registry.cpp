@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <span>
 
@@ -159,6 +160,29 @@ const Format* format_of_head(std::span<const std::byte> head) {
     if (reader.recognises != nullptr && reader.recognises(head)) return &reader.format;
   }
   return nullptr;
+}
+
+bool is_raster_in_folder(const std::string& path) {
+  const std::filesystem::path file(path);
+  std::string name = lower_case(file.filename().string());
+  if (name.starts_with(".")) return false;
+  for (const char* packed : {".zip", ".tar", ".tgz", ".tar.gz"}) {
+    if (name.ends_with(packed)) return is_archive_of_rasters(path);
+  }
+  if (name.ends_with(".gz")) name.resize(name.size() - 3);
+  if (name.ends_with(".dat")) return has_envi_header(path);
+  // Headers and virtual rasters are about other files, and so is a label beside its image.
+  if (name.ends_with(".hdr") || name.ends_with(".vrt")) return false;
+  std::error_code none;
+  const auto has_image = [&](const char* extension) {
+    return std::filesystem::exists(std::filesystem::path(path).replace_extension(extension), none);
+  };
+  if (name.ends_with(".lbl") && (has_image(".img") || has_image(".IMG") || has_image(".Img"))) return false;
+  return std::ranges::any_of(native_formats(), [&](const Format& format) {
+    return std::ranges::any_of(format.extensions, [&](const std::string_view extension) {
+      return name.size() > extension.size() && name.ends_with(extension);
+    });
+  });
 }
 
 std::string library_of(const Format& format) {

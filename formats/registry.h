@@ -30,6 +30,10 @@ struct Format {
 /// The native format whose signature a file's first 256 bytes hold; nullptr where they hold none.
 [[nodiscard]] const Format* format_of_head(std::span<const std::byte> head);
 
+/// Whether a file of a folder is one of its rasters: by its extension, of ZIP and tar by the names inside, of .dat by
+/// the header beside it. Headers and labels beside images are not.
+[[nodiscard]] bool is_raster_in_folder(const std::string& path);
+
 /// "libtiff 4.5.0", or "isohf".
 [[nodiscard]] std::string library_of(const Format& format);
 

@@ -1,0 +1,91 @@
+#include "formats/option_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "formats/io/text.h"
+#include "isohf/base/output_file.h"
+#include "isohf/error.h"
+#include "isohf/projection/length_unit.h"
+
+namespace isohf {
+namespace {
+
+/// A number and nothing else, without a locale.
+std::optional<double> number_from(std::string_view text) {
+  double value = 0.0;
+  if (text.starts_with('+')) text.remove_prefix(1);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool is_number = error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
+  return is_number ? std::optional(value) : std::nullopt;
+}
+
+}  // namespace
+
+std::string system_from(const std::string& text) {
+  constexpr std::size_t kMostBytes = 65536;
+  std::error_code ignored;
+  if (text.empty())
+    throw Error(ErrorCode::kInvalidArgument, "found '', must be EPSG:2154, WKT, a PROJ string or a file");
+  if (!std::filesystem::is_regular_file(text, ignored)) {
+    const std::string extension = lower_case(std::filesystem::path(text).extension().string());
+    if (extension != ".prj" && extension != ".wkt" && extension != ".txt") return text;
+    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', no such file");
+  }
+  const std::vector<std::byte> bytes = head_of_file(text, kMostBytes);
+  std::string held(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  held.erase(held.find_last_not_of(" \t\r\n") + 1);
+  if (held.empty() || held.find('\0') != held.npos) {
+    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', a file that must hold WKT or a PROJ string");
+  }
+  return held;
+}
+
+LengthValue parse_length(const std::string& text) {
+  LengthValue length;
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data() + (text.starts_with('+') ? 1 : 0), end, length.value);
+  const std::string_view unit_name(std::find_if(rest, end, [](char c) { return c != ' '; }), end);
+  const auto unit = unit_name.empty() ? std::nullopt : linear_unit(unit_name);
+  if (error != std::errc() || !(unit_name.empty() || unit) || !std::isfinite(length.value) || length.value <= 0.0) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("found '{}', must be a number greater than 0, alone or with a unit: mm, cm, m, km, ft, "
+                            "us-ft, yd, mi or nm (nautical miles)",
+                            text));
+  }
+  if (unit) length = {length.value * unit->metres, true};
+  return length;
+}
+
+double parse_ratio(const std::string& text) {
+  const std::size_t slash = std::min(text.find('/'), text.size());
+  const std::optional<double> above = number_from(std::string_view(text).substr(0, slash));
+  const std::optional<double> below =
+      slash == text.size() ? 1.0 : number_from(std::string_view(text).substr(slash + 1));
+  if (!above || !below || *above <= 0.0 || *below <= 0.0 || !std::isnormal(*above / *below)) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("found '{}', must be a number greater than 0 or a fraction as in 1/2", text));
+  }
+  return *above / *below;
+}
+
+std::string with_plain_numbers(const std::string& text) {
+  std::string plain;
+  for (std::size_t from = 0; from <= text.size();) {
+    const std::size_t to = std::min(text.find_first_of(",:", from), text.size());
+    const std::string word = text.substr(from, to - from);
+    const std::optional<double> number = number_from(word);  // nullopt for "nan", or with a unit
+    plain += (number ? fmt::format("{}", *number) : word) + text.substr(to, 1);
+    from = to + 1;
+  }
+  return plain;
+}
+
+}  // namespace isohf
