@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,21 @@ struct ShardNumber {
   int number = 1;
   int count = 1;
 };
+
+/// "3/64". Throws Error{kInvalidArgument} "found ..., must be ...".
+[[nodiscard]] ShardNumber shard_number_from_string(const std::string& text);
+
+/// What no shard can know alone: a `z_range` of all elevations, and the step of the codes that suit them.
+struct ShardRange {
+  double min = 0.0;
+  double max = 0.0;
+  double step = 0.0;
+};
+/// Reads the whole source, as convert() without `z_range` does, and widens what it finds to whole steps: no elevation
+/// lies outside. nullopt for `code_type` f32, which needs no range. Throws Error{kInvalidArgument} if there is no such
+/// shard.
+[[nodiscard]] std::optional<ShardRange> shard_range(HeightSource& source, const ShardNumber& shard,
+                                                    const ConvertOptions& options, const Job& job = {});
 
 /// convert() of one shard, a work file that merge_shards() reads. Shards have about equally many rows of tiles, and end
 /// where rows of the first coarse plane do if there are enough of these. `lossless` reads all samples once more, for

@@ -27,6 +27,7 @@ struct Conversion {
   double height_error = 0.0;  ///< of heights above it
   Quantisation quantisation{};
   double largest = 0.0;         ///< no elevation is meant to lie further from 0
+  ElevationRange range{};       ///< that the codes reach over
   CodeLimits limits{};          ///< of what is stored; the ends of options.z_range where it is given
   std::int64_t first_tile = 0;  ///< flat index; of a shard
   std::int64_t end_tile = plan.grid.tile_count();

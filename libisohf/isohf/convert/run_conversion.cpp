@@ -6,6 +6,7 @@
 #include <oneapi/tbb/parallel_pipeline.h>
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -313,6 +314,32 @@ AccuracyInfo info_of(const AccuracyReport& report, const ConvertOptions& options
 Plan plan_conversion(const SourceInfo& info, const ConvertOptions& options) {
   check(options);
   return make_plan(info, options.plan);
+}
+
+ShardRange find_shard_range(HeightSource& source, const ConvertOptions& options, const Job& job) {
+  const Plan plan = plan_conversion(source.info(), options);
+  const MemoryPlan memory = plan_memory(source, plan, options, job);
+  check_memory(source, plan, options, memory, job);
+  source.limit_buffers(memory.source_buffer_bytes);
+  const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));
+  Conversion conversion{source, options, plan, memory, kernel, Prefilter::make(kernel.filter(), options.acquisition),
+                        job};
+  ConvertSummary summary(plan.grid);
+  Arena(job).execute([&] { choose_codes(conversion, summary); });
+  if (options.z_range) return {options.z_range->first, options.z_range->second, conversion.quantisation.scale};
+  const ElevationRange& range = conversion.range;
+  const double step = conversion.quantisation.scale;
+  const bool takes_all_codes = (range.max - range.min) / step + 2.0 > conversion.quantisation.max_code();
+  // Ends that are short to write: whole steps, or decimal fractions of a step if that takes all codes.
+  const double unit = takes_all_codes ? std::pow(10.0, std::floor(std::log10(step))) : step;
+  const auto end = [&](double units) {
+    const std::string text = fmt::format("{:.12g}", units * unit);
+    double value = 0.0;
+    std::from_chars(text.data(), text.data() + text.size(), value);
+    return value;
+  };
+  const double first = std::floor(range.min / unit + 1e-9);
+  return {end(first), end(std::max(std::ceil(range.max / unit - 1e-9), first + 1.0)), step};
 }
 
 ConversionResult run_conversion(HeightSource& source, const Plan& plan, const std::string& output,

@@ -7,6 +7,7 @@
 #include "isohf/convert.h"
 #include "isohf/convert/conversion.h"
 #include "isohf/convert/frame/plan.h"
+#include "isohf/shards.h"
 
 namespace isohf {
 
@@ -26,6 +27,9 @@ struct ShardWork {
 
 /// make_plan() for a conversion: refuses options that none can have.
 [[nodiscard]] Plan plan_conversion(const SourceInfo& info, const ConvertOptions& options);
+
+/// ShardRange of a conversion (isohf/shards.h).
+[[nodiscard]] ShardRange find_shard_range(HeightSource& source, const ConvertOptions& options, const Job& job);
 
 /// One conversion, by a plan that was made of options.plan. `is_retry`: an interrupt leaves no part file behind, which
 /// `resume` could not use.

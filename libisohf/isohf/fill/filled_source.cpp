@@ -337,6 +337,17 @@ std::uint64_t FilledSource::buffer_bytes(std::uint64_t limit) const {
   return source_->buffer_bytes(limit) + fill_memory_bytes(info_, file_.has_value());
 }
 
+std::optional<VoidCounts> void_counts(const HeightSource& source, std::optional<std::int64_t> voids) {
+  const std::int64_t rows = source.info().height;
+  if (const auto* filled = dynamic_cast<const FilledSource*>(&source))
+    return filled->counts().rows == rows ? std::optional(filled->counts()) : std::nullopt;
+  if (!voids) return std::nullopt;
+  VoidCounts counts;
+  counts.rows = rows;
+  counts.found = counts.left = *voids;
+  return counts;
+}
+
 std::unique_ptr<HeightSource> with_voids_treated(std::unique_ptr<HeightSource> source, const VoidTreatment& treatment,
                                                  const Job& job) {
   if (!source) throw Error(ErrorCode::kInvalidArgument, "there is no source whose voids could be treated");

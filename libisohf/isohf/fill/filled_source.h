@@ -78,6 +78,10 @@ class FilledSource final : public HeightSource {
   VoidCounts counts_;
 };
 
+/// The voids of a source of which every row has been read: as a FilledSource counted them, or `voids` of any other;
+/// nullopt if nobody counted.
+[[nodiscard]] std::optional<VoidCounts> void_counts(const HeightSource& source, std::optional<std::int64_t> voids);
+
 /// What a FilledSource with this info() holds at most, beyond its source; 0 for an info that says nothing of treatment.
 [[nodiscard]] std::uint64_t fill_memory_bytes(const SourceInfo& info, bool in_scratch);
 

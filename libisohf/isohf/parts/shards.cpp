@@ -4,6 +4,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <charconv>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -60,8 +61,6 @@ std::string job_of(const SourceInfo& info, const Plan& plan, const ConvertOption
 void check_shard(const ConvertOptions& options, const ShardNumber& shard, std::size_t shards) {
   const auto refuse = [](const std::string& why) { throw Error(ErrorCode::kInvalidArgument, why); };
   if (options.max_error) refuse("`max_error` needs all of the source at once; leave it out for a shard");
-  if (!options.z_range && options.code_type != CodeType::kF32)
-    refuse("a shard needs `z_range`, or `code_type` f32, as it does not see all elevations");
   if (shard.number < 1 || shard.number > shard.count)
     refuse(fmt::format("there is no shard {} of {}", shard.number, shard.count));
   if (shards < static_cast<std::size_t>(shard.count))
@@ -180,10 +179,33 @@ Statistics joined_statistics(const std::vector<std::optional<CheckedShard>>& sha
 
 }  // namespace
 
+ShardNumber shard_number_from_string(const std::string& text) {
+  ShardNumber shard;
+  const char* const end = text.data() + text.size();
+  const auto [slash, error] = std::from_chars(text.data(), end, shard.number);
+  const bool is_pair = error == std::errc() && slash != end && *slash == '/';
+  const auto [rest, count_error] = std::from_chars(is_pair ? slash + 1 : end, end, shard.count);
+  if (!is_pair || count_error != std::errc() || rest != end || shard.number < 1 || shard.count > kMostShards) {
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("found '{}', must be K/N, as in 3/16", text));
+  }
+  return shard;
+}
+
+std::optional<ShardRange> shard_range(HeightSource& source, const ShardNumber& shard, const ConvertOptions& options,
+                                      const Job& job) {
+  (void)work_of(source.info(), plan_conversion(source.info(), options), options, shard);
+  if (options.code_type == CodeType::kF32) return std::nullopt;
+  return find_shard_range(source, options, job);
+}
+
 ConvertSummary convert_shard(HeightSource& source, const ShardNumber& shard, const std::string& output,
                              const ConvertOptions& options, const Job& job) {
   const Plan plan = plan_conversion(source.info(), options);
   const ShardWork work = work_of(source.info(), plan, options, shard);
+  if (!options.z_range && options.code_type != CodeType::kF32) {
+    throw Error(ErrorCode::kInvalidArgument,
+                "a shard needs `z_range`, or `code_type` f32, as it does not see all elevations");
+  }
   return run_conversion(source, plan, output, options, job, false, &work).summary;
 }
 

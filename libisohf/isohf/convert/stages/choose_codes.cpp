@@ -151,6 +151,7 @@ void choose_codes(Conversion& conversion, ConvertSummary& summary) {
   if (conversion.options.z_range) {
     const ElevationRange range{conversion.options.z_range->first, conversion.options.z_range->second};
     conversion.quantisation = quantisation_of_range(request_of(conversion, range), range, info);
+    conversion.range = range;
     conversion.limits = {range.min, range.max};
     return;
   }
@@ -170,6 +171,7 @@ void choose_codes(Conversion& conversion, ConvertSummary& summary) {
   const QuantisationRequest request = request_of(conversion, found.range);
   if (conversion.plan.outside != Outside::kClamp) found.range = EdgeRange::widen(found.range, edge.bound());
   conversion.quantisation = choose_quantisation(request, found.range, info);
+  conversion.range = found.range;
   const double over = overshoot(conversion.kernel, conversion.prefilter);
   if (over > 0.0 && conversion.options.code_type != CodeType::kF32) {
     // The surface may leave the samples' range. Where the codes reach far enough for the worst case at the same step,
@@ -179,9 +181,11 @@ void choose_codes(Conversion& conversion, ConvertSummary& summary) {
     const bool has_step =
         request.max_rounding || (request.step ? *request.step != 0.0 : !is_floating(info.sample_type));
     const ElevationRange reach = widened(found.range, over);
-    conversion.quantisation = found.voids == 0 && is_large && has_step && has_codes_for(conversion.quantisation, reach)
+    const bool reaches_all = found.voids == 0 && is_large && has_step && has_codes_for(conversion.quantisation, reach);
+    conversion.range = reaches_all ? reach : measure_surface(conversion, found.range);
+    conversion.quantisation = reaches_all
                                   ? choose_quantisation({request.type, conversion.quantisation.scale}, reach, info)
-                                  : choose_quantisation(request, measure_surface(conversion, found.range), info);
+                                  : choose_quantisation(request, conversion.range, info);
   }
   conversion.limits = code_limits(conversion.quantisation);
 }
