@@ -61,6 +61,24 @@ std::string describe_map_scale(const MapGround& ground) {
       ground.worst_place.longitude, ground.worst_place.latitude);
 }
 
+std::string describe_map(const std::optional<ProjectionRecord>& projection, const std::optional<MapGround>& ground,
+                         const std::string& why_no_map, bool wraps_x) {
+  std::string text = projection            ? describe_projection(*projection)
+                     : ground              ? describe_map_scale(*ground)
+                     : !why_no_map.empty() ? "scale not known: " + why_no_map
+                                           : "";
+  if (wraps_x) text += std::string(text.empty() ? "" : "; ") + "the East edge is joined to the West edge";
+  return text;
+}
+
+std::string describe_textures(const TextureInfo& info) {
+  return fmt::format("{0} x {0} texels a tile, {1} levels, {2}{3}, {4}: {5} members, {6}", info.size, info.levels,
+                     to_string(info.format),
+                     info.format == TextureFormat::kJpeg ? fmt::format(" {}", info.quality) : "",
+                     info.channels == 1 ? "grey" : (info.channels == 3 ? "RGB" : "RGBA"), describe_count(info.members),
+                     describe_bytes(info.bytes));
+}
+
 int raw_bytes(CodeType type) {
   switch (type) {
     case CodeType::kU8:

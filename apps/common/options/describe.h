@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
+#include "isohf/archive/textures/texture_info.h"
 #include "isohf/convert/frame/plan.h"
 
 namespace isohf::cli {
@@ -20,6 +22,14 @@ namespace isohf::cli {
 
 /// Lengths on a source's own map for those on the ground.
 [[nodiscard]] std::string describe_map_scale(const MapGround& ground);
+
+/// The map of a result: its projection, else the scale of the source's own, or why that is not known. Empty without one.
+[[nodiscard]] std::string describe_map(const std::optional<ProjectionRecord>& projection,
+                                       const std::optional<MapGround>& ground, const std::string& why_no_map,
+                                       bool wraps_x);
+
+/// "1024 x 1024 texels a tile, 8 levels, jpeg 90: 1040 members, 12.3 MB".
+[[nodiscard]] std::string describe_textures(const TextureInfo& info);
 
 /// Bytes of one stored elevation before coding.
 [[nodiscard]] int raw_bytes(CodeType type);

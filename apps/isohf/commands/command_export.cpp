@@ -12,7 +12,6 @@
 #include "input/box_ground.h"
 #include "input/input_files.h"
 #include "input/options_source.h"
-#include "input/quantities.h"
 #include "input/source_inputs.h"
 #include "isohf/base/arena.h"
 #include "isohf/convert/frame/source_frame.h"

@@ -13,7 +13,6 @@
 #include "commands/command.h"
 #include "input/input_files.h"
 #include "input/options_source.h"
-#include "input/options_texture.h"
 #include "input/source_place.h"
 #include "input/source_size.h"
 #include "isohf/archive.h"
@@ -280,7 +279,7 @@ std::string describe_archive(const ArchiveReader& archive) {
   say("size", describe_size(metadata, derived.tile_bytes));
   if (const auto info = accuracy_info(metadata)) say("error", describe_accuracy(*info, unit));
   if (const auto info = texture_info(metadata)) {
-    say("textures", fmt::format("{}; from {}, {} x {} pixels, placed by {}", describe_textures(*info, 0.0),
+    say("textures", fmt::format("{}; from {}, {} x {} pixels, placed by {}", describe_textures(*info),
                                 info->photo_name, info->photo_width, info->photo_height, info->placed_by));
   }
   if (const auto record = lossless_record(metadata)) {

@@ -12,7 +12,6 @@
 #include "commands/command.h"
 #include "formats/georeference/reference_system.h"
 #include "input/input_files.h"
-#include "input/options_ground.h"
 #include "input/options_source.h"
 #include "input/source_inputs.h"
 #include "isohf/error.h"

@@ -1,121 +1,139 @@
 #include "input/convert_setup.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
-#include <cstdlib>
+#include <algorithm>
+#include <bit>
+#include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
-#include <optional>
-#include <set>
+#include <limits>
 
+#include "formats/georeference/reference_system.h"
 #include "formats/io/file_stamp.h"
-#include "input/input_files.h"
-#include "input/options_ground.h"
-#include "input/options_lattice.h"
 #include "input/options_source.h"
-#include "input/options_texture.h"
-#include "input/source_inputs.h"
-#include "input/source_size.h"
-#include "interrupt.h"
-#include "isohf/archive.h"
-#include "isohf/archive/metadata/accuracy_info.h"
-#include "isohf/base/file.h"
-#include "isohf/base/output_file.h"
-#include "isohf/convert.h"
-#include "isohf/convert/frame/plan.h"
-#include "isohf/convert/job_description.h"
-#include "isohf/convert/memory_plan.h"
+#include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
-#include "isohf/raster.h"
+#include "isohf/photo/texture_cutter.h"
+#include "isohf/picture.h"
 #include "isohf/resampling.h"
 #include "options/command_line.h"
-#include "options/describe.h"
 #include "options/option_values.h"
-#include "options/work_options.h"
-#include "output/accuracy_output.h"
-#include "output/json_output.h"
 #include "output/output_kinds.h"
-#include "output/plan_report.h"
-#include "output/standard_output.h"
-#include "output/void_counts_output.h"
 
 namespace isohf::cli {
 namespace {
-
-/// The last name is the output if -o names none and it is called .isohf. Any other name is an input: a forgotten output
-/// must not cost the last of them.
-void take_output(ConvertCommandOptions& options) {
-  std::vector<std::string>& names = options.inputs.names;
-  if (!options.output.empty() || names.size() < 2 || !is_archive_name(names.back())) return;
-  options.output = names.back();
-  names.pop_back();
-}
-
-/// "3/64".
-ShardNumber shard_from_string(const std::string& text) {
-  const std::size_t slash = text.find('/');
-  if (slash == std::string::npos) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("found \"{}\", must be K/N, as in 3/16", text));
-  }
-  return {static_cast<int>(parse_whole_number(text.substr(0, slash), 1, kMostShards)),
-          static_cast<int>(parse_whole_number(text.substr(slash + 1), 1, kMostShards))};
-}
 
 [[noreturn]] void refuse(const std::string& why) {
   throw Error(ErrorCode::kInvalidArgument, why);
 }
 
-/// What has no meaning for many archives, or for a shard.
-void check_kind(const CLI::App& line, const ConvertCommandOptions& options) {
-  const auto refuse_with = [&](const char* kind, std::initializer_list<const char*> others) {
-    for (const char* option : others) {
-      if (given(line, option)) refuse(fmt::format("{} cannot be combined with {}", option, kind));
-    }
-  };
-  if (!options.out_dir.empty()) refuse_with("--out-dir", {"--output", "--shard", "--on-top"});
-  if (options.keep_going && options.out_dir.empty()) refuse("--keep-going needs --out-dir");
-  if (!options.shard) return;
-  refuse_with("--shard", {"--resume", "--max-error"});
-  if (!options.convert.z_range && options.convert.code_type != CodeType::kF32) {
-    refuse(
-        "--shard needs --z-range MIN:MAX, or --type f32, as no shard sees all elevations; isohf plan INPUT --shard K/N "
-        "prints the range");
+void parse_shape(const std::string& text, PlanRequest& request) {
+  constexpr std::int64_t kMostTriangles = std::numeric_limits<std::int32_t>::max();
+  request.shape.reset();
+  request.budget.reset();
+  if (text.find_first_of("xX") == std::string::npos) {
+    request.budget = ShapeBudget{ShapeBudget::Kind::kTriangles, parse_whole_number(text, 1, kMostTriangles)};
+  } else {
+    request.shape = parse_size(text, 1, kMaxTileRows);
   }
 }
 
-}  // namespace
-
-/// What is packed shares the memory with what is read from it, and with the tiles.
-void share_memory(ConvertCommandOptions& options) {
-  options.open.unpacked_bytes = options.work.unpacked_bytes(options.open.unpacked_bytes);
+ProjectionRequest parse_map(const std::string& text) {
+  static const std::vector<std::string> kKinds = {"auto",
+                                                  "none",
+                                                  "equirectangular",
+                                                  "local",
+                                                  "utm",
+                                                  "transverse-mercator",
+                                                  "lambert-conformal",
+                                                  "polar-stereographic"};
+  const std::string word = text.substr(0, text.find(':'));
+  try {
+    // A file may have the name of a kind.
+    return ProjectionRequest::parse(std::ranges::find(kKinds, word) != kKinds.end() ? text : system_from(text));
+  } catch (const Error& error) {
+    throw Error(error.code(), error.what() + did_you_mean(word, kKinds), error.parts());
+  }
 }
 
-void add_conversion_options(CLI::App& line, ConvertCommandOptions& options, Common& common) {
-  option(line, "-o,--output", "OUTPUT", "Archive to write [default: the last name, if it ends in .isohf]",
-         options.output);
-  line.add_flag("--overwrite", options.convert.overwrite, "Replace OUTPUT if it exists");
-  line.add_flag("--resume", options.convert.resume,
-                "Continue OUTPUT.part of an interrupted run after checking it, and skip complete archives");
-  option(line, "--out-dir", "DIR", "Make DIR/NAME.isohf from each input; all names are inputs", options.out_dir);
-  line.add_flag("--keep-going", options.keep_going, "With --out-dir: continue after a failed input");
-  option(line, "--shard", "K/N", "Make shard K of N, some rows of tiles; isohf merge joins them",
-         [&options](const std::string& text) { options.shard = shard_from_string(text); });
-  add_source_options(line, options.open);
-  add_mosaic_options(line, options.inputs);
-  add_lattice_options(line, options.convert.plan, options.spacing_in_metres);
-  add_shape_options(line, options.convert.plan);
-  add_ground_options(line, options.convert.plan.ground);
-  add_geoid_option(line, options.geoid);
-  add_quantisation_options(line, options.convert);
+std::optional<double> parse_step(const std::string& text) {
+  double step = 0.0;
+  if (text == "auto") return std::nullopt;
+  if (text == "finest") return 0.0;
+  if (!read_number(text, step) || !std::isfinite(step) || step <= 0.0)
+    refuse("found '" + text + "', must be a number greater than 0, finest or auto");
+  return step;
+}
+
+void add_map_options(CLI::App& line, GroundRequest& request) {
+  group(line, "Map");
+  option(line, "--to-crs", "SYSTEM",
+         "Map of the result: auto, none, equirectangular, local, utm, transverse-mercator, lambert-conformal, "
+         "polar-stereographic (parameters follow a colon, as in utm:32N), or a reference system as for --crs [default: "
+         "auto for degrees, none for maps]",
+         [&request](const std::string& text) { request.projection = parse_map(text); });
+  line.add_flag_callback(
+      "--wrap-x", [&request] { request.wrap = Wrap::kAlways; },
+      "Join the East edge to the West edge, or fail [default: if the input goes all the way round]");
+  line.add_flag_callback(
+      "--no-wrap", [&request] { request.wrap = Wrap::kNever; }, "Do not join them");
+  exclusive(line, {"--wrap-x", "--no-wrap"});
+}
+
+void add_lattice_options(CLI::App& line, PlanRequest& request, bool& spacing_in_metres) {
+  group(line, "Lattice");
+  option(line, "--density", "RATIO",
+         "Vertices per sample, as in 0.5 or 1/2; 0.866 is the isotropic optimum [default: 1]",
+         [&request](const std::string& text) { request.density = parse_ratio(text); });
+  option(line, "--spacing", "LENGTH",
+         "Distance between neighbouring columns of vertices: world units, or with a unit as in 30m, 0.5km, 100ft",
+         [&request, &spacing_in_metres](const std::string& text) {
+           const LengthValue length = parse_length(text);
+           request.spacing = length.value;
+           spacing_in_metres = length.in_metres;
+         });
+  exclusive(line, {"--density", "--spacing"});
+  line.add_flag("--fit", request.fit, "Stretch tiles slightly to end on the input's edge");
+  choice<Outside>(line, "--outside", {{"cover", Outside::kCover}, {"clamp", Outside::kClamp}, {"void", Outside::kVoid}},
+                  "Beyond the input, continue the slope for two lattice steps and then level (cover), repeat the edge "
+                  "(clamp), or store nodata (void) [default: cover]",
+                  request.outside);
+  group(line, "Tile shape");
+  option(line, "--shape", "CxR|N", "Stored elevations per tile, as in 212x243; or the best shape of about N triangles",
+         [&request](const std::string& text) { parse_shape(text, request); });
+  option(line, "--levels", "N", "Levels of detail, 1 to 14 [default: 4, or fewer for a small input]",
+         [&request](const std::string& text) {
+           request.levels = static_cast<int>(parse_whole_number(text, 1, kMaxTileLevels));
+         });
+}
+
+void add_precision_options(CLI::App& line, ConvertOptions& options) {
+  group(line, "Precision");
+  choice<CodeType>(line, "--type", {{"u16", CodeType::kU16}, {"u8", CodeType::kU8}, {"f32", CodeType::kF32}},
+                   "Stored elevations: codes with one step for all tiles, or floats [default: u16]", options.code_type);
+  CLI::Option* const range = option(line, "--z-range", "MIN:MAX",
+                                    "Refuse elevations outside this range [default: the range found in a first pass]",
+                                    [&options](const std::string& text) { options.z_range = parse_range(text); });
+  line.add_flag("--clamp-range", options.clamp_range, "Clamp elevations to --z-range, and count them, instead")
+      ->needs(range);
+  option(line, "--step", "S|finest|auto", "Elevation step of one code [default: auto, from the input's own step]",
+         [&options](const std::string& text) { options.step = parse_step(text); });
+  option(line, "--max-rounding", "E",
+         "Store every vertex to within E, as LERC's MAX_Z_ERROR; this does not bound the surface between them",
+         [&options](const std::string& text) { options.max_rounding = parse_positive_number(text); });
+  option(line, "--max-error", "E",
+         "Keep the surface, as drawn, within E of every sample, or fail. Chooses density, step and filter unless given",
+         [&options](const std::string& text) { options.max_error = parse_positive_number(text); });
   group(line, "Reconstruction");
   option(line, "--filter", "nearest|bilinear|limited-cubic|bspline3",
          "Reconstruction filter [default: " + to_string(kDefaultFilter) + "]",
-         [&options](const std::string& text) { options.convert.filter = filter_from_string(text); });
+         [&options](const std::string& text) { options.filter = filter_from_string(text); });
   option(line, "--acquisition", "point|box|gaussian:SIGMA|TAPS",
-         "How samples were taken; taps as in 0.25,0.5,0.25 [default: " + to_string(options.convert.acquisition) + "]",
-         [&options](const std::string& text) { options.convert.acquisition = acquisition_from_string(text); });
+         "How samples were taken; taps as in 0.25,0.5,0.25 [default: " + to_string(options.acquisition) + "]",
+         [&options](const std::string& text) { options.acquisition = acquisition_from_string(text); });
+}
+
+void add_extra_options(CLI::App& line, ConvertCommandOptions& options) {
   group(line, "Size and extras");
   choice<Effort>(line, "--effort", {{"fast", Effort::kFast}, {"default", Effort::kDefault}, {"best", Effort::kBest}},
                  "Effort to make the archive small; the elevations are the same", options.convert.effort);
@@ -127,59 +145,103 @@ void add_conversion_options(CLI::App& line, ConvertCommandOptions& options, Comm
   option(line, "--sun-min", "DEG", "Lowest sun for --shadow-seeds; a lower one takes more room [default: 2]",
          [&options](const std::string& text) { options.convert.shadow_seeds.value().sun_min_deg = parse_number(text); })
       ->needs(seeds);
-  add_texture_options(line, options.texture);
+  CLI::Option* const photo = option(line, "--texture", "PHOTO",
+                                    "Cut a texture for every tile from a picture, placed by its georeference, else "
+                                    "over the whole input",
+                                    options.photo);
+  option(line, "--texture-size", "N", "At most N texels a side, a power of two from 64 to 4096 [default: 1024]",
+         [&options](const std::string& text) {
+           options.texture.max_size = static_cast<int>(parse_whole_number(text, kMinTextureSize, kMaxTextureSize));
+           if (!std::has_single_bit(static_cast<unsigned>(options.texture.max_size)))
+             refuse(fmt::format("found '{}', must be a power of two", text));
+         })
+      ->needs(photo);
+}
+
+/// "--fill 50" reads 50 as an input.
+void check_fill(const ConvertCommandOptions& options) {
+  const std::string& first = options.inputs.names.front();
+  std::error_code none;
+  if (options.open.voids.fill && first.find_first_not_of("0123456789") == std::string::npos &&
+      !std::filesystem::exists(first, none))
+    refuse(fmt::format("{0}: no such file; if it is the distance of --fill, write --fill={0}", first));
+}
+
+}  // namespace
+
+void add_conversion_options(CLI::App& line, ConvertCommandOptions& options, Common& common) {
+  option(line, "-o,--output", "OUTPUT", "Archive to write [default: the last name, if it ends in .isohf]",
+         options.output);
+  line.add_flag("--overwrite", options.convert.overwrite, "Replace OUTPUT if it exists");
+  line.add_flag("--resume", options.convert.resume,
+                "Continue OUTPUT.part of an interrupted run after checking it, and skip complete archives");
+  option(line, "--out-dir", "DIR", "Make DIR/NAME.isohf from each input; all names are inputs", options.out_dir);
+  line.add_flag("--keep-going", options.keep_going, "With --out-dir: continue after a failed input");
+  option(line, "--shard", "K/N", "Make shard K of N, some rows of tiles; isohf merge joins them",
+         [&options](const std::string& text) { options.shard = shard_number_from_string(text); });
+  add_source_options(line, options.open);
+  add_mosaic_options(line, options.inputs);
+  add_lattice_options(line, options.convert.plan, options.spacing_in_metres);
+  add_map_options(line, options.convert.plan.ground);
+  add_geoid_option(line, options.geoid);
+  add_precision_options(line, options.convert);
+  add_extra_options(line, options);
   add_work_options(line, options.work, common);
   add_memory_option(line, options.work);
 }
 
 void complete(const CLI::App& line, ConvertCommandOptions& options) {
-  check_kind(line, options);
-  if (options.out_dir.empty()) take_output(options);
-  if (options.convert.lossless && !options.geoid.path.empty()) {
-    refuse("--lossless keeps the input's own samples, --geoid changes them; give one of the two");
+  const auto refuse_with = [&](const char* one, std::initializer_list<const char*> others) {
+    for (const char* other : others) {
+      if (given(line, one) && given(line, other)) refuse(fmt::format("{} cannot be combined with {}", other, one));
+    }
+  };
+  refuse_with("--out-dir", {"--output", "--shard", "--on-top"});
+  refuse_with("--shard", {"--resume", "--max-error"});
+  if (options.keep_going && options.out_dir.empty()) refuse("--keep-going needs --out-dir");
+  // The last name is the output only if it ends in .isohf: a forgotten output must not cost the last input.
+  std::vector<std::string>& names = options.inputs.names;
+  if (options.out_dir.empty() && options.output.empty() && names.size() > 1 && is_archive_name(names.back())) {
+    options.output = names.back();
+    names.pop_back();
   }
+  check_fill(options);
+  if (options.convert.lossless && !options.geoid.path.empty())
+    refuse("--lossless keeps the input's own samples, --geoid changes them; give one of the two");
   options.inputs.as_given = recorded_options(line);
   options.work.scratch_folder = scratch_folder_for(options.out_dir.empty() ? options.output : options.out_dir + "/");
-  share_memory(options);
   options.convert.strict = options.common.strict;
 }
 
 Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files) {
-  options.inputs.onto = options.convert.plan.ground.projection;
+  // What is packed shares the memory with what is read from it, and with the tiles.
+  options.open.unpacked_bytes = options.work.unpacked_bytes(options.open.unpacked_bytes);
+  PlanRequest& plan = options.convert.plan;
+  options.inputs.onto = plan.ground.projection;
   OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work);
-  if (opened.is_reprojected) options.convert.plan.ground.projection = ProjectionRequest{};
-  Prepared prepared{
-      std::move(opened.files),
-      laid_out(std::move(opened.source), options.geoid, options.convert.plan.ground, options.convert.lossless),
-      nullptr};
-  understand_ground(prepared.source->info(), options.convert.plan.ground);
-  options.input = prepared.source->info().path;
+  if (opened.is_reprojected) plan.ground.projection = ProjectionRequest{};
+  Prepared prepared{std::move(opened.files),
+                    laid_out(std::move(opened.source), options.geoid, plan.ground, options.convert.lossless), nullptr};
+  const SourceInfo& info = prepared.source->info();
+  understand_ground(info, plan.ground);
   options.convert.source_note = opened.note;
   if (const std::string& file = options.geoid.path; !file.empty()) {
     prepared.files.push_back(file);
     options.convert.source_note.fingerprint += fmt::format(" | {} {}", file, FileStamp::of(file).text());
   }
-  prepared.photo = open_texture(options.texture, prepared.source->info(), options.convert.texture);
-  check_spacing_unit(prepared.source->info(), options.convert.plan, options.spacing_in_metres);
-  return prepared;
-}
-
-std::uint64_t peak_memory_bytes() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.rfind("VmHWM:", 0) == 0) return std::strtoull(line.c_str() + 6, nullptr, 10) * 1024;
+  if (!options.photo.empty()) {
+    prepared.photo = open_photo(options.photo);
+    options.texture.photo = prepared.photo.get();
+    if (const auto& place = prepared.photo->info().georeference; place && info.georeference.has_origin)
+      options.texture.same_system = are_same(place->system, info.georeference.system);
+    options.convert.texture = options.texture;
   }
-  struct rusage usage {};
-  ::getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
-}
-
-Error interrupted(const std::string& output, const std::string& again) {
-  const std::string part = output + ".part";
-  std::error_code none;
-  return {ErrorCode::kCancelled,
-          {output, std::filesystem::exists(part, none) ? "interrupted" : "interrupted before anything was written", "",
-           std::filesystem::exists(part, none) ? again + " goes on with what is in " + part : ""}};
+  if (options.spacing_in_metres && !make_source_frame(info, plan.ground).in_metres) {
+    refuse(info.path +
+           ": --spacing has a unit, but the input's coordinates are in none that is known; give a plain number, or "
+           "--sample-spacing in metres");
+  }
+  return prepared;
 }
 
 }  // namespace isohf::cli

@@ -1,39 +1,13 @@
 #include "input/options_source.h"
 
-#include <cctype>
 #include <cmath>
-#include <filesystem>
-#include <vector>
 
-#include "formats/io/text.h"
 #include "formats/readers.h"
-#include "input/quantities.h"
-#include "isohf/base/output_file.h"
 #include "isohf/error.h"
-#include "isohf/raster.h"
 #include "options/command_line.h"
 #include "options/option_values.h"
 
 namespace isohf::cli {
-
-std::string system_from(const std::string& text) {
-  constexpr std::size_t kMostBytes = 65536;
-  std::error_code ignored;
-  if (text.empty())
-    throw Error(ErrorCode::kInvalidArgument, "found '', must be EPSG:2154, WKT, a PROJ string or a file");
-  if (!std::filesystem::is_regular_file(text, ignored)) {
-    const std::string extension = lower_case(std::filesystem::path(text).extension().string());
-    if (extension != ".prj" && extension != ".wkt" && extension != ".txt") return text;
-    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', no such file");
-  }
-  const std::vector<std::byte> bytes = head_of_file(text, kMostBytes);
-  std::string held(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  while (!held.empty() && std::isspace(static_cast<unsigned char>(held.back())) != 0) held.pop_back();
-  if (held.empty() || held.find('\0') != held.npos) {
-    throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', a file that must hold WKT or a PROJ string");
-  }
-  return held;
-}
 
 void add_part_options(CLI::App& line, OpenOptions& options) {
   option(line, "--channel", "NAME|N",
@@ -97,6 +71,12 @@ void add_source_options(CLI::App& line, OpenOptions& options) {
       "containing one",
       [&options](const std::string& text) { options.reference_system = system_from(text); });
   exclusive(line, {"--crs", "--sample-spacing"});
+}
+
+CLI::Option* add_geoid_option(CLI::App& line, GeoidRequest& request) {
+  return option(line, "--geoid", "FILE.pgm[:WAY]",
+                "Apply a GeographicLib geoid: to-ellipsoidal or to-orthometric [default: to-ellipsoidal]",
+                [&request](const std::string& text) { request = GeoidRequest::parse(text); });
 }
 
 }  // namespace isohf::cli

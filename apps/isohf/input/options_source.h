@@ -1,8 +1,8 @@
 #pragma once
 
-#include <string>
-
+#include "formats/option_text.h"
 #include "formats/registry.h"
+#include "isohf/fill/geoid_source.h"
 #include "isohf/raster.h"
 #include "program.h"
 
@@ -14,9 +14,7 @@ void add_source_options(CLI::App& line, OpenOptions& options);
 /// Of these --channel and --part, and --raw.
 void add_part_options(CLI::App& line, OpenOptions& options);
 void add_raw_option(CLI::App& line, OpenOptions& options);
-
-/// A reference system as an option's value has it: what is called so is a file that holds the text (a .prj), else the
-/// text itself. Throws Error{kInvalidArgument} for nothing, and for a file that holds no text.
-[[nodiscard]] std::string system_from(const std::string& text);
+/// --geoid FILE.pgm[:to-ellipsoidal|to-orthometric].
+CLI::Option* add_geoid_option(CLI::App& line, GeoidRequest& request);
 
 }  // namespace isohf::cli

@@ -16,12 +16,12 @@
 
 namespace isohf::cli {
 
-/// Options that say how an input is read, by name, without dashes, with their text: as an archive records them.
+/// The options by which an input was read, as an archive records them: name without dashes, and text.
 using RecordedOptions = std::vector<std::pair<std::string, std::string>>;
 
 /// The inputs of a command that form one source, and how they are joined.
 struct SourceInputs {
-  std::vector<std::string> names;  ///< files, folders, patterns and @lists, as on the command line
+  std::vector<std::string> names;  ///< files, folders, patterns and @lists, as typed
   OverlapRule overlap = OverlapRule::kLast;
   bool recursive = false;
   std::optional<BoundingBox> box;           ///< of the whole, only this part
@@ -48,12 +48,17 @@ struct RecordedInput {
 struct OpenedInputs {
   std::vector<std::string> files;
   std::unique_ptr<HeightSource> source;
-  SourceNote note;              ///< for the archive's metadata and --resume; says nothing of a single file
-  bool is_reprojected = false;  ///< inputs of different systems lie on SourceInputs::onto already
+  SourceNote note;              ///< for the archive's metadata and --resume
+  bool is_reprojected = false;  ///< inputs of different systems are on SourceInputs::onto already
 };
 
-/// Opens what `files`, as expand_inputs gives them, are together: the file itself where it is one, else their mosaic.
+/// Opens what `files`, as expand_inputs returns them, are together: the file itself if it is one, else their mosaic.
 [[nodiscard]] OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inputs,
                                        const OpenOptions& options, const WorkOptions& work);
+
+/// The source without a last column that repeats the first one, if both edges will be joined, and moved by the geoid.
+/// keeps_samples  all of them are wanted back: no column goes unless joining was demanded
+[[nodiscard]] std::unique_ptr<HeightSource> laid_out(std::unique_ptr<HeightSource> source, const GeoidRequest& geoid,
+                                                     const GroundRequest& ground, bool keeps_samples);
 
 }  // namespace isohf::cli

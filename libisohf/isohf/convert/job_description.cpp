@@ -10,10 +10,13 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "isohf/archive.h"
 #include "isohf/archive/container/content_hash.h"
+#include "isohf/archive/journal.h"
 
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/tile_statistics.h"
+#include "isohf/error.h"
 
 namespace isohf {
 namespace {
@@ -161,6 +164,46 @@ std::string fingerprint(const SourceInfo& info, const Plan& plan, const ConvertO
   return job;
 }
 
+/// How a finished archive differs from what the job would make now; empty if it does not.
+std::string difference_from_job(const std::string& archive, const SourceInfo& info,
+                                const std::vector<std::string>& files, const ConvertOptions& options) {
+  std::error_code none;
+  const auto written = std::filesystem::last_write_time(archive, none);
+  for (const std::string& file : files) {
+    if (std::filesystem::last_write_time(file, none) > written) return file + " was changed after it was written";
+  }
+  const auto made = nlohmann::json::parse(ArchiveReader(archive).metadata_json());
+  const auto asked =
+      nlohmann::json::parse(format_metadata(describe_job(info, make_plan(info, options.plan), options, {})));
+  const bool same_job = made.contains(kJobName) && made.at(kJobName) == asked.at(kJobName);
+  if (same_job && made.value("planes", nlohmann::json()) == asked.value("planes", nlohmann::json())) return {};
+  // Members that are known before the work, by themselves and then by their own members.
+  std::string found;
+  const auto compare = [&](const std::string& name, const nlohmann::json& theirs, const nlohmann::json& ours) {
+    if (theirs == ours) return;
+    found += fmt::format("{}{} {}, not {}", found.empty() ? "" : ", ", name, theirs.dump(), ours.dump());
+  };
+  for (const char* name : {"tile_shape", "tiles", "extent", "valid", "outside", "projection", "planes", "wraps_x",
+                           "filter", "acquisition", "edges", "level", "source"}) {
+    const nlohmann::json theirs = made.value(name, nlohmann::json());
+    const nlohmann::json ours = asked.value(name, nlohmann::json());
+    if (!theirs.is_object() || !ours.is_object()) {
+      const bool follows_filter =
+          std::string_view(name) == "edges" && made.value("filter", "") != asked.value("filter", "");
+      if (!follows_filter) compare(name, theirs, ours);
+      continue;
+    }
+    for (const auto& [member, value] : ours.items()) {
+      if (member != "stored")
+        compare(fmt::format("{}.{}", name, member), theirs.value(member, nlohmann::json()), value);
+    }
+  }
+  const std::string type = to_string(options.code_type);
+  compare("samples.type", made.at("samples").at("type"), type);
+  return "was made otherwise: " +
+         (found.empty() ? "other elevation codes, shadow seeds, textures or residuals" : found);
+}
+
 }  // namespace
 
 std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
@@ -195,36 +238,28 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   return metadata;
 }
 
-std::string difference_from_job(const std::string& metadata_json, const SourceInfo& info, const Plan& plan,
-                                const ConvertOptions& options) {
-  const auto made = nlohmann::json::parse(metadata_json);
-  const auto asked = nlohmann::json::parse(format_metadata(describe_job(info, plan, options, {})));
-  const bool same_job = made.contains(kJobName) && made.at(kJobName) == asked.at(kJobName);
-  if (same_job && made.value("planes", nlohmann::json()) == asked.value("planes", nlohmann::json())) return {};
-  // Members that are known before the work, by themselves and then by their own members.
-  std::string found;
-  const auto compare = [&](const std::string& name, const nlohmann::json& theirs, const nlohmann::json& ours) {
-    if (theirs == ours) return;
-    found += fmt::format("{}{} {}, not {}", found.empty() ? "" : ", ", name, theirs.dump(), ours.dump());
-  };
-  for (const char* name : {"tile_shape", "tiles", "extent", "valid", "outside", "projection", "planes", "wraps_x",
-                           "filter", "acquisition", "edges", "level", "source"}) {
-    const nlohmann::json theirs = made.value(name, nlohmann::json());
-    const nlohmann::json ours = asked.value(name, nlohmann::json());
-    if (!theirs.is_object() || !ours.is_object()) {
-      const bool follows_filter =
-          std::string_view(name) == "edges" && made.value("filter", "") != asked.value("filter", "");
-      if (!follows_filter) compare(name, theirs, ours);
-      continue;
-    }
-    for (const auto& [member, value] : ours.items()) {
-      if (member != "stored")
-        compare(fmt::format("{}.{}", name, member), theirs.value(member, nlohmann::json()), value);
-    }
+bool is_converted(const std::string& output, const SourceInfo& info, const std::vector<std::string>& files,
+                  const ConvertOptions& options) {
+  std::error_code none;
+  if (!std::filesystem::exists(output, none)) return false;
+  ErrorCode code = ErrorCode::kInvalidArgument;
+  std::string difference;
+  try {
+    difference = difference_from_job(output, info, files, options);
+  } catch (const Error& error) {
+    const std::string why = error.what();
+    code = error.code();
+    difference = "is not a complete archive: " + why.substr(why.starts_with(output + ": ") ? output.size() + 2 : 0);
   }
-  const std::string type = to_string(options.code_type);
-  compare("samples.type", made.at("samples").at("type"), type);
-  return found.empty() ? "other elevation codes, shadow seeds, textures or residuals" : found;
+  if (difference.empty()) {
+    // A run that was killed between its last two steps left its journal.
+    const std::string part = output + ".part";
+    if (!std::filesystem::exists(part, none)) std::filesystem::remove(part + ".journal", none);
+    remove_part_aside(part);
+    return true;
+  }
+  if (options.overwrite) return false;
+  throw Error(code, {output, difference, "", "`overwrite` replaces it"});
 }
 
 }  // namespace isohf

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "isohf/archive/metadata/shard_record.h"
 #include "isohf/convert.h"
@@ -17,9 +18,11 @@ namespace isohf {
 [[nodiscard]] Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOptions& options,
                                     const Quantisation& quantisation);
 
-/// In which way a finished archive with these metadata is another one than the job would make, as "filter "bilinear",
-/// not "nearest""; empty where there is none. The source's samples are not looked at.
-[[nodiscard]] std::string difference_from_job(const std::string& metadata_json, const SourceInfo& info,
-                                              const Plan& plan, const ConvertOptions& options);
+/// Whether `output` is the archive that the job would make now, complete; then what a killed run left beside it is
+/// removed. Samples are not compared. Throws Error{kInvalidArgument} with the difference, as "filter "bilinear", not
+/// "nearest"", and as opening the archive does; with options.overwrite it returns false instead.
+/// files  that the source is read from
+[[nodiscard]] bool is_converted(const std::string& output, const SourceInfo& info,
+                                const std::vector<std::string>& files, const ConvertOptions& options);
 
 }  // namespace isohf

@@ -1,4 +1,4 @@
-/// convert --each: one archive of each input, in one run.
+/// convert --out-dir: one archive of each input, in one run.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ class ConvertEach : public testing::Test {
     return found;
   }
   RunResult each(std::vector<std::string> more = {}) const {
-    return run_isohf(with_more({"convert", "--each", in_, "--out-dir", out_}, more));
+    return run_isohf(with_more({"convert", in_, "--out-dir", out_}, more));
   }
 
   TemporaryFolder folder_;
@@ -62,7 +62,8 @@ TEST_F(ConvertEach, MakesTheBytesOfSingleRuns) {
     const RunResult result = each(more);
     EXPECT_EQ(result.exit_code, 0);
     EXPECT_EQ(result.err, "");
-    EXPECT_THAT(result.out, testing::StartsWith("6 files: 6 converted in "));
+    EXPECT_THAT(result.out, testing::StartsWith("converted    " + out_ + "/a.isohf: "));
+    EXPECT_THAT(result.out, HasSubstr("\nfiles        6: 6 converted in "));
     EXPECT_THAT(archives(), ElementsAre("a.isohf", "b.isohf", "c.isohf", "d.isohf", "e.isohf", "f.isohf"));
     for (const char* name : {"a", "f"}) {
       ASSERT_EQ(run_isohf({"convert", in_ + "/" + name + ".asc", single, "--overwrite"}).exit_code, 0);
@@ -79,7 +80,7 @@ TEST_F(ConvertEach, KeepsFoldersBelowAFolder) {
 }
 
 TEST_F(ConvertEach, RefusesTwoInputsOfOneNameBeforeAnyWork) {
-  const RunResult result = run_isohf({"convert", "--each", in_, in_ + "/deep/er/a.asc", "--out-dir", out_});
+  const RunResult result = run_isohf({"convert", in_, in_ + "/deep/er/a.asc", "--out-dir", out_});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr(in_ + "/a.asc and " + in_ + "/deep/er/a.asc would both be this archive"));
   EXPECT_FALSE(fs::exists(out_));
@@ -107,10 +108,10 @@ TEST_F(ConvertEach, LeavesExistingArchivesUnlessToldWhatToDo) {
   fs::remove(out_ + "/c.isohf");
   const RunResult resumed = each({"--resume"});
   EXPECT_EQ(resumed.exit_code, 0);
-  EXPECT_THAT(resumed.out, testing::StartsWith("6 files: 1 converted, 5 complete before in "));
+  EXPECT_THAT(resumed.out, HasSubstr("files        6: 1 converted, 5 complete before in "));
   EXPECT_EQ(read_text(out_ + "/a.isohf"), before);
-  EXPECT_THAT(each({"--resume"}).out, testing::StartsWith("6 files: 0 converted, 6 complete before in "));
-  EXPECT_THAT(each({"--overwrite"}).out, testing::StartsWith("6 files: 6 converted in "));
+  EXPECT_THAT(each({"--resume"}).out, HasSubstr("files        6: 0 converted, 6 complete before in "));
+  EXPECT_THAT(each({"--overwrite"}).out, HasSubstr("files        6: 6 converted in "));
 }
 
 TEST_F(ConvertEach, TakesAnIncompleteFileOfThatNameForAnError) {
@@ -118,18 +119,18 @@ TEST_F(ConvertEach, TakesAnIncompleteFileOfThatNameForAnError) {
   fs::resize_file(out_ + "/b.isohf", fs::file_size(out_ + "/b.isohf") / 2);
   const RunResult result = each({"--resume", "--keep-going"});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.out, testing::StartsWith("6 files: 0 converted, 5 complete before, 1 failed in "));
+  EXPECT_THAT(result.out, HasSubstr("files        6: 0 converted, 5 complete before, 1 failed in "));
   // The file's name need not be said twice.
-  const std::size_t name = result.err.find("b.isohf: is no complete archive: ");
+  const std::size_t name = result.err.find("b.isohf: is not a complete archive: ");
   ASSERT_NE(name, std::string::npos) << result.err;
   EXPECT_EQ(result.err.find("b.isohf", name + 1), std::string::npos) << result.err;
 }
 
 TEST_F(ConvertEach, SaysThatItKeepsAnInterruptedRunAsASingleRunDoes) {
   fs::create_directories(out_);
-  const std::string told = "isohf: " + out_ +
-                           "/b.isohf.part: 4 bytes of an interrupted run are kept until this run is complete; to "
-                           "continue that one instead, interrupt and give --resume\n";
+  const std::string told = "isohf convert: " + out_ +
+                           "/b.isohf.part: keeping 4 bytes of an interrupted run until this one is complete. "
+                           "--resume would continue it\n";
   const auto leave = [&] {
     write_text(out_ + "/b.isohf.part", "left");
     write_text(out_ + "/b.isohf.part.journal", std::string(100, 'x'));
@@ -147,11 +148,11 @@ TEST_F(ConvertEach, StopsAtABadFileOrKeepsGoing) {
   write_text(in_ + "/b.asc", "ncols 2\nnrows 2\ncellsize 1\n1 2 three 4\n");
   const RunResult stopped = each({"-j", "1"});
   EXPECT_EQ(stopped.exit_code, 1);
-  EXPECT_THAT(stopped.out, testing::StartsWith("6 files: 1 converted, 1 failed, 4 not done in "));
+  EXPECT_THAT(stopped.out, HasSubstr("files        6: 1 converted, 1 failed, 4 not done in "));
   EXPECT_THAT(archives(), ElementsAre("a.isohf"));
   const RunResult going = each({"--resume", "--keep-going", "--json"});
   EXPECT_EQ(going.exit_code, 1);
-  EXPECT_THAT(going.err, testing::StartsWith("isohf: " + in_ + "/b.asc: "));
+  EXPECT_THAT(going.err, testing::StartsWith("isohf convert: " + in_ + "/b.asc: "));
   const std::vector<json> lines = lines_of(going.out);
   ASSERT_EQ(lines.size(), 7U);
   EXPECT_EQ(lines[0].at("status"), "complete");
@@ -166,7 +167,7 @@ TEST_F(ConvertEach, GoesOnPastAFileOfNodata) {
   const RunResult result = each({"--json", "-j", "1"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  EXPECT_THAT(result.err, testing::StartsWith("isohf: " + in_ + "/b.asc: all 4 samples"));
+  EXPECT_THAT(result.err, testing::StartsWith("isohf convert: " + in_ + "/b.asc: all 4 samples"));
   const std::vector<json> lines = lines_of(result.out);
   ASSERT_EQ(lines.size(), 7U);
   EXPECT_EQ(lines[1].at("status"), "nodata");
@@ -184,10 +185,10 @@ TEST_F(ConvertEach, TellsOnceOfAFolderThatMayNotBeWrittenTo) {
   RunOptions plain_user;
   plain_user.without_privileges = true;
   if (run_isohf({"--version"}, plain_user).exit_code != 0) GTEST_SKIP() << "other users cannot run the program";
-  const RunResult result = run_isohf({"convert", "--each", in_, "--out-dir", out_, "--keep-going"}, plain_user);
+  const RunResult result = run_isohf({"convert", in_, "--out-dir", out_, "--keep-going"}, plain_user);
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(result.out, "");
-  EXPECT_EQ(result.err, "isohf: cannot write into folder " + out_ + ": Permission denied\n");
+  EXPECT_EQ(result.err, "isohf convert: cannot write into folder " + out_ + ": Permission denied\n");
 }
 
 TEST_F(ConvertEach, AnInterruptLeavesWhatResumeGoesOnWith) {
@@ -198,7 +199,7 @@ TEST_F(ConvertEach, AnInterruptLeavesWhatResumeGoesOnWith) {
     list += name + "\n";
   }
   write_text(folder_ / "list.txt", list);
-  const std::vector<std::string> command = {"convert", "--each", "@" + (folder_ / "list.txt"), "--out-dir", out_};
+  const std::vector<std::string> command = {"convert", "@" + (folder_ / "list.txt"), "--out-dir", out_};
   std::vector<std::string> begun = {isohf_path()};
   begun.insert(begun.end(), command.begin(), command.end());
   begun.insert(begun.end(), {"--progress", "json"});
@@ -218,18 +219,18 @@ TEST_F(ConvertEach, AnInterruptLeavesWhatResumeGoesOnWith) {
 }
 
 TEST_F(ConvertEach, SaysWhichOptionsAreForOneArchive) {
-  for (const std::vector<std::string>& more : {std::vector<std::string>{"-o", "x.isohf"}, {"--dry-run"}}) {
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{"--output", "x.isohf"}, {"--shard", "1/2"}, {"--on-top", "first"}}) {
     const RunResult result = each(more);
     EXPECT_EQ(result.exit_code, 2);
-    EXPECT_THAT(result.err, HasSubstr("is for one archive"));
+    EXPECT_THAT(result.err, HasSubstr(more.front() + " cannot be combined with --out-dir"));
   }
-  EXPECT_THAT(run_isohf({"convert", "a", "b", "--keep-going"}).err, HasSubstr("--keep-going needs --each"));
-  EXPECT_THAT(run_isohf({"convert", "--each", "a"}).err, HasSubstr("--each needs --out-dir"));
+  EXPECT_THAT(run_isohf({"convert", "a", "b", "--keep-going"}).err, HasSubstr("--keep-going needs --out-dir"));
 }
 
 TEST_F(ConvertEach, SaysWhyAFolderCannotBeMade) {
   write_text(folder_ / "file", "");
-  const RunResult result = run_isohf({"convert", "--each", in_, "--out-dir", folder_ / "file/new"});
+  const RunResult result = run_isohf({"convert", in_, "--out-dir", folder_ / "file/new"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("cannot make the folder " + (folder_ / "file/new") + ": Not a directory"));
 }

@@ -77,7 +77,7 @@ class MosaicCommand : public ::testing::Test {
     EXPECT_EQ(result.exit_code, exit_code) << result.err;
     EXPECT_EQ(result.out, "");
     EXPECT_THAT(result.err, HasSubstr(text));
-    EXPECT_THAT(result.err, StartsWith("isohf: "));
+    EXPECT_THAT(result.err, StartsWith("isohf convert: "));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   }
 
@@ -219,7 +219,7 @@ TEST_F(MosaicCommand, WhatIsNotThereOrTwiceThereIsNamed) {
   write_file(folder / "list.txt", "piece0.tif\n\nnone.tif\n");
   expect_error({"convert", a, folder / "none.tif", out}, 1, "none.tif: no such file");
   expect_error({"convert", folder / "x*.tif", out}, 1, "x*.tif: no file matches");
-  expect_error({"convert", empty, out}, 1, "holds no raster that isohf reads (");
+  expect_error({"convert", empty, out}, 1, "contains no raster that isohf reads; --recursive");
   expect_error({"convert", "@" + (folder / "none.txt"), out}, 1, "none.txt: no such list of inputs");
   expect_error({"convert", "@" + (folder / "blank.txt"), out}, 1, "blank.txt: names no input");
   expect_error({"convert", "@" + (folder / "list.txt"), out}, 1, "list.txt: line 3: ");
@@ -230,7 +230,7 @@ TEST_F(MosaicCommand, WhatIsNotThereOrTwiceThereIsNamed) {
   // A forgotten output.
   raster.cut(folder / "piece2.tif", {0, 0, 50, 50});
   expect_error({"convert", a, b, folder / "piece2.tif", "--overwrite"}, 2,
-               "piece2.tif is not called .isohf and counts as an input");
+               "piece2.tif is an input; name an archive NAME.isohf, or give -o");
   EXPECT_EQ(folder.names(), (Words{"blank.txt", "empty", "list.txt", "piece0.tif", "piece1.tif", "piece2.tif"}));
 }
 
@@ -284,7 +284,7 @@ TEST_F(MosaicCommand, ResumeRefusesOtherMembers) {
   Words resume = command;
   resume.emplace_back("--resume");
   Words other = resume;
-  other.insert(other.end(), {"--overlap", "first"});
+  other.insert(other.end(), {"--on-top", "first"});
   std::filesystem::last_write_time(folder / "b.tif", before + std::chrono::seconds(1));
   const RunResult changed = run_program(resume);
   EXPECT_NE(changed.exit_code, 0);

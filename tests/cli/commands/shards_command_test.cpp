@@ -7,8 +7,10 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <regex>
+#include <sstream>
 
 #include "support/rasters/degree_grid.h"
 #include "support/rasters/plain_tiff.h"
@@ -47,7 +49,7 @@ class ShardsCommand : public testing::Test {
       const RunResult made = run(words_of(std::string(k) + "/3", stem + k + ".isohf", more));
       ASSERT_EQ(made.exit_code, 0) << made.err;
       EXPECT_EQ(made.err, "");
-      EXPECT_THAT(made.out, HasSubstr(std::string("shard ") + k + "/3 done: " + stem + k + ".isohf, "));
+      EXPECT_THAT(made.out, HasSubstr(std::string("shard ") + k + "/3    done: " + stem + k + ".isohf, "));
     }
   }
   /// One line on standard error, nothing on the other, and no file more or less.
@@ -69,7 +71,7 @@ TEST_F(ShardsCommand, MakeTheBytesOfOneRunAndAreNotMadeTwice) {
   EXPECT_THAT(run({"info", "p-3.isohf"}).out, HasSubstr("3 of 3, rows "));
   const RunResult again = run(words_of("2/3", "p-2.isohf"));
   EXPECT_EQ(again.exit_code, 0);
-  EXPECT_THAT(again.out, HasSubstr("shard 2/3 done already: p-2.isohf, "));
+  EXPECT_THAT(again.out, HasSubstr("shard 2/3    done already: p-2.isohf, "));
   expect_refused(words_of("1/3", "p-2.isohf"), 2, "p-2.isohf");
   EXPECT_EQ(run({"merge", "p-1.isohf", "p-2.isohf", "p-3.isohf", "-o", "land.isohf"}).exit_code, 0);
   EXPECT_EQ(run({"convert", "land.tif", "single.isohf", "--shadow-seeds", "--shape", "28x35", "--z-range", "0:500"})
@@ -93,12 +95,41 @@ TEST_F(ShardsCommand, AreRefusedByNumberAndOptions) {
   expect_refused(words_of("0/3", "a.isohf"), 2, "--shard");
   expect_refused(words_of("one", "a.isohf"), 2, "must be K/N, as in 3/16");
   expect_refused({"convert", "land.tif", "-o", "a.isohf", "--shard", "1/3"}, 2,
-                 "--shard needs --z-range MIN:MAX, or --type f32, as no shard sees all elevations; isohf info --stats "
-                 "INPUT prints their range");
-  for (const Words& more : {Words{"--dry-run"}, {"--resume"}, {"--max-error", "3"}})
-    expect_refused(words_of("1/3", "a.isohf", more), 2, more.front() + " has no place with --shard");
+                 "--shard needs --z-range MIN:MAX, or --type f32, as no shard sees all elevations; isohf plan INPUT "
+                 "--shard K/N prints the range");
+  for (const Words& more : {Words{"--resume"}, {"--max-error", "3"}})
+    expect_refused(words_of("1/3", "a.isohf", more), 2, more.front() + " cannot be combined with --shard");
   const RunResult floats = run({"convert", "land.tif", "-o", "a.isohf", "--shard", "1/3", "--type", "f32"});
   EXPECT_EQ(floats.exit_code, 0) << floats.err;
+}
+
+/// What plan prints is pasted; the shards have the codes of a run without --z-range, and nothing lies outside.
+TEST_F(ShardsCommand, NeedTheOptionsThatPlanPrints) {
+  for (const Words& more : {Words{}, {"--filter", "bspline3"}, {"--step", "0.3"}, {"--type", "u8"}, {"--type", "f32"},
+                            {"--max-rounding", "0.2", "--acquisition", "box"}}) {
+    const RunResult text = run(with_more({"plan", "land.tif", "--shape", "28x35", "--shard", "1/2"}, more));
+    ASSERT_EQ(text.exit_code, 0) << text.err;
+    const json plan =
+        json::parse(run(with_more({"plan", "land.tif", "--shape", "28x35", "--shard", "1/2", "--json"}, more)).out);
+    const std::string printed = plan.at("shard_options");
+    EXPECT_THAT(text.out, HasSubstr("\nshards       " + printed + "\n"));
+    std::istringstream words(printed);
+    const Words options = with_more(more, Words(std::istream_iterator<std::string>(words), {}));
+    const auto convert = [&](const Words& what, const Words& how) {
+      const RunResult made = run(with_more(with_more({"convert", "land.tif", "--shape", "28x35", "-q"}, what), how));
+      EXPECT_EQ(made.exit_code, 0) << printed << made.err;
+    };
+    convert({"-o", "1.isohf", "--shard", "1/2", "--overwrite"}, options);
+    convert({"-o", "2.isohf", "--shard", "2/2", "--overwrite"}, options);
+    ASSERT_EQ(run({"merge", "1.isohf", "2.isohf", "-o", "land.isohf", "--overwrite"}).exit_code, 0);
+    convert({"single.isohf", "--overwrite"}, options);
+    EXPECT_EQ(read_file(folder / "land.isohf"), read_file(folder / "single.isohf")) << printed;
+    convert({"free.isohf", "--overwrite"}, more);
+    const auto samples = [&](const char* name) {
+      return json::parse(run({"info", name, "--json"}).out).at("metadata").at("samples");
+    };
+    EXPECT_NEAR(samples("land.isohf").at("scale"), samples("free.isohf").at("scale"), 0.01) << printed;
+  }
 }
 
 TEST_F(ShardsCommand, AreJoinedOnlyWithTheirOwnAndNothingIsLost) {
@@ -159,7 +190,7 @@ TEST_F(ShardsCommand, OfAnExtractEverythingIsWhereItWas) {
       RunOptions options;
       options.folder = folder.path();
       options.input = places;
-      return run_isohf({"sample", archive, "--crs"}, options);
+      return run_isohf({"sample", archive, "--in", "crs"}, options);
     };
     const RunResult before = sampled("whole.isohf");
     ASSERT_EQ(before.exit_code, 0) << before.err;
@@ -181,7 +212,7 @@ TEST_F(ShardsCommand, OfAnArchiveACoarsePlaneIsAnArchiveOfItsOwn) {
       0);
   const json whole = json::parse(run({"info", "single.isohf", "--json"}).out);
   ASSERT_GE(whole.at("metadata").at("planes").at("count").get<int>(), 2) << whole.dump(1);
-  const RunResult made = run({"extract", "single.isohf", "-o", "afar.isohf", "--plane", "1"});
+  const RunResult made = run({"extract", "single.isohf", "-o", "afar.isohf", "--overview", "1"});
   EXPECT_EQ(made.exit_code, 0) << made.err;
   EXPECT_EQ(made.err, "");
   EXPECT_EQ(run({"verify", "afar.isohf"}).exit_code, 0) << run({"verify", "afar.isohf"}).out;
@@ -189,13 +220,13 @@ TEST_F(ShardsCommand, OfAnArchiveACoarsePlaneIsAnArchiveOfItsOwn) {
   EXPECT_EQ(afar.at("metadata").at("planes").at("count").get<int>(),
             whole.at("metadata").at("planes").at("count").get<int>() - 1);
   EXPECT_FALSE(afar.at("metadata").contains("shadow_seeds"));
-  EXPECT_EQ(run({"extract", "single.isohf", "-o", "corner.isohf", "--plane", "1", "--tiles", "0:1,0:2"}).exit_code, 0);
+  EXPECT_EQ(run({"extract", "single.isohf", "-o", "corner.isohf", "--overview", "1", "--tiles", "0:1,0:2"}).exit_code, 0);
   EXPECT_EQ(run({"verify", "corner.isohf"}).exit_code, 0);
-  expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--plane", "9"}, 2,
+  expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--overview", "9"}, 2,
                  "coarse planes, plane 9 is asked for");
-  expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--plane", "1", "--tiles", "0:1000,0:1"}, 2,
+  expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--overview", "1", "--tiles", "0:1000,0:1"}, 2,
                  "of tiles are asked for, it holds");
-  expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--plane", "0"}, 2, "--plane");
+  expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--overview", "0"}, 2, "--overview");
 }
 
 }  // namespace

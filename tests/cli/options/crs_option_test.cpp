@@ -72,7 +72,7 @@ TEST_F(CrsOption, CompletesTheFileAndMovesNoSample) {
 
 TEST_F(CrsOption, PlacesRastersWithoutASystem) {
   ASSERT_EQ(convert("EPSG:32611").err, "");
-  const RunResult answer = run_isohf({"sample", archive_, "--at-crs", "600", "600", "--with-lonlat"});
+  const RunResult answer = run_isohf({"sample", archive_, "--at", "600,600", "--in", "crs", "--with", "lonlat"});
   EXPECT_EQ(answer.exit_code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr(" -121.48")) << "half a million metres West of the zone's meridian, 117 W";
   ASSERT_EQ(run_isohf({"export", archive_, folder_ / "back.flt", "--quiet"}).err, "");

@@ -23,25 +23,6 @@ json parsed(const std::vector<std::string>& arguments) {
   return json::parse(result.out);
 }
 
-TEST(TilesOption, ADensityThatNobodyAskedForIsAWarningWithTheFigure) {
-  const TemporaryFolder folder;
-  const std::vector<std::string> thin = {"--tiles", "2x2", "--shape", "28x35", "--levels", "2"};
-  const auto with_thin = [&](std::vector<std::string> arguments) {
-    arguments.insert(arguments.end(), thin.begin(), thin.end());
-    return run_isohf(arguments);
-  };
-  const RunResult planned = with_thin({"plan", kCoast, "--json"});
-  const RunResult made = with_thin({"convert", kCoast, folder / "thin.isohf", "--json"});
-  for (const RunResult* result : {&planned, &made}) {
-    ASSERT_EQ(result->exit_code, 0);
-    EXPECT_THAT(result->err, HasSubstr("vertices for one of the input's samples"));
-    const json document = json::parse(result->out);
-    EXPECT_THAT(document.at("warnings").back().get<std::string>(), HasSubstr("leave out --shape or --tiles"));
-  }
-  const RunResult asked = run_isohf({"plan", kCoast, "--density", "1/50"});
-  EXPECT_EQ(asked.err, "");
-}
-
 TEST(LengthOption, TakesUnitsWhereTheWorldIsInMetres) {
   const TemporaryFolder folder;
   write_int16_tiff(folder / "a.tif", 300, 200,

@@ -56,7 +56,7 @@ TEST_F(ManyFiles, AreVerifiedInOrderAndTheBadOneStopsNoOther) {
                                        HasSubstr("damaged.isohf: FAILED"), HasSubstr("u8.isohf: passed")));
   EXPECT_LT(text.out.find("u16-globe-lossless.isohf"), text.out.find("u8.isohf"));
   EXPECT_THAT(text.err, HasSubstr("none.isohf: "));
-  EXPECT_THAT(text.err, HasSubstr("isohf: verify: 4 files: 2 done, 1 with differences, 1 failed\n"));
+  EXPECT_THAT(text.err, HasSubstr("isohf verify: 4 files: 2 done, 1 with differences, 1 failed\n"));
 
   command.emplace_back("--json");
   const std::vector<json> lines = lines_of(run_isohf(command).out);
@@ -107,7 +107,7 @@ TEST_F(ManyFiles, AreDescribedOneAfterTheOther) {
   const RunResult text = run_isohf({"info", folder / "in", folder / "in/deeper"});
   EXPECT_EQ(text.exit_code, 0) << text.err;
   EXPECT_THAT(text.out, testing::AllOf(HasSubstr("archive      "), HasSubstr("\n\nraster       ")));
-  EXPECT_EQ(text.err, "isohf: info: 3 files: 3 done, 0 failed\n");
+  EXPECT_EQ(text.err, "isohf info: 3 files: 3 done, 0 failed\n");
   const std::vector<json> lines = lines_of(run_isohf({"info", folder / "in", folder / "in/deeper", "--json"}).out);
   ASSERT_EQ(lines.size(), 3U);
   EXPECT_TRUE(lines[0].contains("archive"));

@@ -240,24 +240,24 @@ TEST_F(MapCommand, SampleTakesAndGivesTheInputsOwnCoordinatesAndDegrees) {
       EXPECT_EQ(result.err, "");
       return result.out;
     };
-    const json by_crs = json::parse(sample({"--crs", "--json"}, crs));
+    const json by_crs = json::parse(sample({"--in", "crs", "--json"}, crs));
     EXPECT_NEAR(by_crs.at("elevation").get<double>(), slope(place), 0.5);
     EXPECT_NEAR(by_crs.at("lonlat").at("longitude").get<double>(), place.longitude, 1e-9);
     EXPECT_NEAR(by_crs.at("lonlat").at("latitude").get<double>(), place.latitude, 1e-9);
     EXPECT_NEAR(by_crs.at("crs").at("x").get<double>(), there.easting, 1e-5);
     EXPECT_NEAR(by_crs.at("crs").at("y").get<double>(), there.northing, 1e-5);
-    const json by_geo = json::parse(sample({"--lonlat", "--json"}, "6.51,44.49\n"));
+    const json by_geo = json::parse(sample({"--in", "lonlat", "--json"}, "6.51,44.49\n"));
     EXPECT_NEAR(by_geo.at("x").get<double>(), by_crs.at("x").get<double>(), 1e-5);
     EXPECT_NEAR(by_geo.at("z").get<double>(), by_crs.at("z").get<double>(), 1e-5);
 
-    std::istringstream line(sample({"--crs", "--with-crs", "--with-lonlat"}, crs));
+    std::istringstream line(sample({"--in", "crs", "--with", "crs", "--with", "lonlat"}, crs));
     std::vector<double> columns((std::istream_iterator<double>(line)), {});
     ASSERT_EQ(columns.size(), 10U);
     EXPECT_NEAR(columns[6], there.easting, 1e-4);
     EXPECT_NEAR(columns[7], there.northing, 1e-4);
     EXPECT_NEAR(columns[8], place.longitude, 1e-8);
     EXPECT_NEAR(columns[9], place.latitude, 1e-8);
-    EXPECT_THAT(sample({"--lonlat", "--with-lonlat"}, "0 0\n"), testing::StartsWith("outside "));
+    EXPECT_THAT(sample({"--in", "lonlat", "--with", "lonlat"}, "0 0\n"), testing::StartsWith("outside "));
   }
 }
 
@@ -269,17 +269,17 @@ TEST_F(MapCommand, SampleWithoutTheModuleTakesWhatNeedsNone) {
   fs::copy_file(isohf_path(), program);
   const auto run = [&](const std::string& archive, const std::string& way) {
     const json centre = info("a.isohf").at("centre");
-    const bool by_crs = way == "--crs";
+    const bool by_crs = way == "crs";
     return run_program(
-        {program, "sample", folder / archive, way},
+        {program, "sample", folder / archive, "--in", way},
         with_input(by_crs ? fmt::format("{} {}", centre.at("x").get<double>(), centre.at("y").get<double>())
                           : "6.5 44.5"));
   };
   // Metres of the source are metres of the world; UTM and the ground's own map are ours.
-  EXPECT_EQ(run("a.isohf", "--crs").exit_code, 0);
-  EXPECT_EQ(run("a.isohf", "--lonlat").exit_code, 0);
-  EXPECT_EQ(run("b.isohf", "--lonlat").exit_code, 0);
-  const RunResult result = run("b.isohf", "--crs");
+  EXPECT_EQ(run("a.isohf", "crs").exit_code, 0);
+  EXPECT_EQ(run("a.isohf", "lonlat").exit_code, 0);
+  EXPECT_EQ(run("b.isohf", "lonlat").exit_code, 0);
+  const RunResult result = run("b.isohf", "crs");
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(result.out, "");
   EXPECT_THAT(result.err, HasSubstr(".isohf: reference systems need the PROJ module isohf_proj.so"));

@@ -108,7 +108,7 @@ TEST_F(MaxError, WhatTheUserGaveStaysAndIsNamedWhereItIsInTheWay) {
   const json info = json::parse(run_isohf({"info", folder / "a.isohf", "--json"}).out).at("metadata");
   EXPECT_EQ(info.at("filter"), "bilinear");
   EXPECT_EQ(info.at("samples").at("scale"), 0.5);
-  EXPECT_EQ(convert({"--max-error", "3", "--dry-run"}).exit_code, 2);
+  EXPECT_EQ(run_isohf({"plan", folder / "a.tif", "--max-error", "3"}).exit_code, 2);
 }
 
 TEST_F(MaxError, BytesDoNotDependOnThreadsOrMemoryAndAResumedRunGivesTheSame) {

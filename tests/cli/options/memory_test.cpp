@@ -140,7 +140,7 @@ TEST(Memory, ConvertStaysWithinATenthOfWhatItIsGivenAndWritesTheSameBytes) {
   EXPECT_EQ(folder.names(), (std::vector<std::string>{"bound.isohf", "free.isohf", "wide.raw"}));
 }
 
-TEST(Memory, TheDryRunSaysTheLeastAndConvertTakesIt) {
+TEST(Memory, PlanPrintsTheLeastAndConvertTakesIt) {
   const TemporaryFolder folder;
   write_file(folder / "wide.raw", wide_raster());
   const std::vector<std::string> command = {"convert",
@@ -155,7 +155,12 @@ TEST(Memory, TheDryRunSaysTheLeastAndConvertTakesIt) {
     more.insert(more.begin(), command.begin(), command.end());
     return run_isohf(more);
   };
-  const auto plan = nlohmann::json::parse(with({"--dry-run"}).out);
+  const auto planned = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words = with_more(command, more);
+    words.front() = "plan";
+    return nlohmann::json::parse(run_isohf(words).out);
+  };
+  const auto plan = planned({});
   EXPECT_EQ(plan.at("scratch_bytes"), 0);
   const auto least = plan.at("least_memory_bytes").get<std::uint64_t>();
   EXPECT_LT(least, plan.at("estimated_memory_bytes").get<std::uint64_t>());
@@ -164,7 +169,7 @@ TEST(Memory, TheDryRunSaysTheLeastAndConvertTakesIt) {
   EXPECT_THAT(refused.err, HasSubstr("needs at least " + std::to_string((least + 999999) / 1000000) + " MB"));
   EXPECT_EQ(folder.names(), std::vector<std::string>{"wide.raw"});
   const std::string enough = std::to_string(least / 1000000 + 1) + "MB";
-  EXPECT_GT(nlohmann::json::parse(with({"--dry-run", "--memory", enough}).out).at("scratch_bytes"), 0);
+  EXPECT_GT(planned({"--memory", enough}).at("scratch_bytes"), 0);
   std::vector<std::string> without_folder = {"/usr/bin/env", "TMPDIR=" + (folder / "none"), isohf_path()};
   without_folder.insert(without_folder.end(), command.begin(), command.end());
   without_folder.insert(without_folder.end(), {"--memory", enough});

@@ -171,13 +171,14 @@ TEST(MarsMegdr, LandsAtItsRadiusAndLongitude) {
       const auto [least, most] = std::minmax_element(std::begin(raw), std::end(raw));
       const double at_longitude = place.origin_x + static_cast<double>(column) * place.spacing_x;
       const double at_latitude = place.origin_y - static_cast<double>(row) * place.spacing_y;
-      const RunResult sampled = run_isohf(
-          {"sample", folder / "mars.isohf", "--at-lonlat", std::to_string(at_longitude), std::to_string(at_latitude)});
+      const RunResult sampled =
+          run_isohf({"sample", folder / "mars.isohf", "--in", "lonlat", "--at",
+                     std::to_string(at_longitude) + "," + std::to_string(at_latitude)});
       EXPECT_GE(std::stod(sampled.out), *least - 20.0) << longitude << "," << latitude;
       EXPECT_LE(std::stod(sampled.out), *most + 20.0) << longitude << "," << latitude;
     }
   }
-  const double summit = std::stod(run_isohf({"sample", folder / "mars.isohf", "--at-lonlat", "226.2", "18.4"}).out);
+  const double summit = std::stod(run_isohf({"sample", folder / "mars.isohf", "--in", "lonlat", "--at", "226.2,18.4"}).out);
   EXPECT_GT(summit, 17000.0);
 }
 

@@ -44,7 +44,7 @@ TEST_F(ResumeComplete, IsDoneInOneLine) {
   const RunResult result = resume();
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.err, "");
-  EXPECT_EQ(result.out, output_ + ": complete already, made of this input with these options\n");
+  EXPECT_EQ(result.out, "archive      " + output_ + ": complete already\n");
   EXPECT_EQ(read_text(output_), before_);
   const nlohmann::json document = nlohmann::json::parse(resume({"--filter", "nearest", "--json"}).out);
   EXPECT_EQ(document.at("status"), "complete");

@@ -73,7 +73,7 @@ TEST_F(TextureOption, RefusesWhatItCannotUse) {
   const auto refused = [&](const std::vector<std::string>& arguments, int exit_code, const std::string& text) {
     const RunResult result = convert(arguments);
     EXPECT_EQ(result.exit_code, exit_code) << result.err;
-    EXPECT_THAT(result.err, StartsWith("isohf: "));
+    EXPECT_THAT(result.err, StartsWith("isohf convert: "));
     EXPECT_THAT(result.err, HasSubstr(text));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
     EXPECT_EQ(result.out, "");
@@ -128,7 +128,7 @@ TEST_F(TextureOption, WarnsOfAPhotoOfAnotherShape) {
   write_pixmap("square.ppm", 100, 100);
   const RunResult result = convert({"--texture", folder / "square.ppm"});
   EXPECT_EQ(result.exit_code, 0);
-  EXPECT_THAT(result.err, StartsWith("isohf: warning: "));
+  EXPECT_THAT(result.err, StartsWith("isohf convert: warning: "));
   EXPECT_THAT(result.err, HasSubstr("does it show the same ground?"));
 }
 

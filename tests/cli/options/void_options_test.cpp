@@ -1,4 +1,4 @@
-/// --nodata, --valid-range and --fill, from the command line to what verify and restore make of them.
+/// --nodata, --valid-range and --fill, from the command line to what verify makes of them.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -85,7 +85,7 @@ TEST_F(VoidOptions, FillLeavesNoHoleAndVerifyRepeatsIt) {
 }
 
 TEST_F(VoidOptions, FillDistanceBoundsTheFilling) {
-  const json summary = convert({"--nodata", "-32768,9999", "--fill-distance", "4"});
+  const json summary = convert({"--nodata", "-32768,9999", "--fill=4"});
   const json& voids = summary.at("source_voids");
   EXPECT_EQ(voids.at("found"), kHole + kSpike);
   EXPECT_GT(voids.at("left").get<int>(), 30);
@@ -96,19 +96,17 @@ TEST_F(VoidOptions, FillDistanceBoundsTheFilling) {
 TEST_F(VoidOptions, SummarySaysHowManyVoidsThereAre) {
   const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--nodata", "-32768,9999"});
   EXPECT_EQ(result.err, "");
-  EXPECT_THAT(result.out, HasSubstr("252 samples of the input\n"));
+  EXPECT_THAT(result.out, HasSubstr("; nodata in 252 samples\n"));
   const RunResult treated = run_isohf(
       {"convert", folder / "a.tif", folder / "b.isohf", "--nodata", "-32768", "--valid-range", "100:5000", "--fill"});
-  EXPECT_THAT(treated.out, HasSubstr("321 samples of the input, 72 by --valid-range; 321 filled, 0 left"));
+  EXPECT_THAT(treated.out, HasSubstr("; nodata in 321 samples, 72 by --valid-range; 321 filled, 0 left\n"));
 }
 
 TEST_F(VoidOptions, NonsenseIsAUsageError) {
-  const std::vector<std::vector<std::string>> cases = {{"--fill-distance", "0"},   {"--fill-distance", "5000"},
-                                                       {"--valid-range", "9:3"},   {"--valid-range", "7"},
-                                                       {"--nodata", "-32768,far"}, {"--nodata", "40000"}};
-  for (const std::vector<std::string>& options : cases) {
-    const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "b.isohf", options[0], options[1]});
-    EXPECT_EQ(result.exit_code, 2) << options[1];
+  for (const char* option : {"--fill=0", "--fill=5000", "--valid-range=9:3", "--valid-range=7", "--nodata=-32768,far",
+                             "--nodata=40000"}) {
+    const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "b.isohf", option});
+    EXPECT_EQ(result.exit_code, 2) << option;
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   }
 }
