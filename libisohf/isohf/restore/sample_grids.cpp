@@ -543,6 +543,19 @@ SampleGrid grid_of_source(const Metadata& metadata, const SourceGridRequest& req
   return grid_over_source(metadata, system, shown, request);
 }
 
+std::optional<Georeference> picture_georeference(const Metadata& metadata, const GridSize& size) {
+  const SourceRecord& source = metadata.source;
+  if (!source.origin_x || !source.origin_y || !(source.crs_spacing_x > 0.0) || !(source.crs_spacing_y > 0.0)) {
+    return std::nullopt;
+  }
+  auto found = grid_georeference(metadata, grid_over(metadata.valid, true, size, {}));
+  found->registration = Registration::kArea;
+  if (is_warped(metadata)) return found;
+  found->system.vertical_datum.clear();
+  found->system.vertical_epsg.reset();
+  return found;
+}
+
 bool is_source_system(const Metadata& metadata, const GridSystem& system) {
   const SourceRecord& source = metadata.source;
   const Georeference& place = system.place;

@@ -57,6 +57,9 @@ struct SourceGridRequest {
 /// stand for areas or are posts as the source's do; of an extracted part those on the rectangle around it.
 /// Throws Error{kInvalidArgument} where the box holds nothing, or the source's map is not understood.
 [[nodiscard]] SampleGrid grid_of_source(const Metadata& metadata, const SourceGridRequest& request);
+/// Where a picture lies that shows what the source covered in `size` areas; nullopt if the source did not say where it
+/// lies.
+[[nodiscard]] std::optional<Georeference> picture_georeference(const Metadata& metadata, const GridSize& size);
 /// True where coordinates are those of the source.
 [[nodiscard]] bool is_source_system(const Metadata& metadata, const GridSystem& system);
 [[nodiscard]] bool is_in_source_system(const Metadata& metadata, const SampleGrid& grid);

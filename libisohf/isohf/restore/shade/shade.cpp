@@ -287,10 +287,10 @@ bool casts_shadows(const ShadeOptions& options) {
 /// Throws Error{kInvalidArgument} for options that are out of their ranges.
 void require(const ShadeOptions& options, const GridSize& size) {
   const auto check = [](bool holds, const char* what) {
-    if (!holds) throw Error(ErrorCode::kInvalidArgument, std::string("shade: ") + what);
+    if (!holds) throw Error(ErrorCode::kInvalidArgument, what);
   };
-  require_known("shade: the kind", options.kind, ShadeKind::kShadowMask);
-  require_known("shade: the palette", options.palette.value_or(ShadePalette::kElevation), ShadePalette::kMars);
+  require_known("the kind", options.kind, ShadeKind::kShadowMask);
+  require_known("the palette", options.palette.value_or(ShadePalette::kElevation), ShadePalette::kMars);
   check(size.first >= 1 && size.second >= 1 && size.first <= kMostPixels && size.second <= kMostPixels,
         "the picture must have 1 to 2^20 pixels a side");
   check(std::isfinite(options.sun_azimuth_deg), "the sun's azimuth must be a number of degrees");
@@ -850,8 +850,7 @@ GridSize shade_size(const ArchiveReader& archive, std::optional<std::int64_t> lo
   const double side = std::max(bounds.x1 - bounds.x0, bounds.z1 - bounds.z0);
   const std::int64_t most = longest.value_or(kDefaultPixels);
   if (most < 1 || most > kMostPixels) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("shade: the longer side is {} pixels, must be 1 to 2^20", most));
+    throw Error(ErrorCode::kInvalidArgument, fmt::format("the longer side is {} pixels, must be 1 to 2^20", most));
   }
   const double least = longest ? 0.0 : 2.0 * archive.grid().sigma_x();
   const double pixel = std::max(least, side / static_cast<double>(most));
@@ -881,7 +880,7 @@ ShadeReport shade_rows(const ArchiveReader& archive, const ShadeOptions& options
 Picture shade(const ArchiveReader& archive, const ShadeOptions& options, const Job& job) {
   const ShadeSamples samples = shade_samples(options);
   if (samples.type != SampleType::kUint8) {
-    throw Error(ErrorCode::kInvalidArgument, "shade: a Picture holds bytes, not floats");
+    throw Error(ErrorCode::kInvalidArgument, "a Picture holds bytes, not floats");
   }
   const GridSize size = options.size.value_or(shade_size(archive));
   require(options, size);
@@ -889,9 +888,8 @@ Picture shade(const ArchiveReader& archive, const ShadeOptions& options, const J
     try {
       return Picture(static_cast<int>(size.first), static_cast<int>(size.second), samples.channels);
     } catch (const std::exception&) {  // too long for a vector, or no memory
-      throw Error(
-          ErrorCode::kOutOfMemory,
-          fmt::format("shade: {} x {} pixels do not fit memory; shade_rows() gives rows", size.first, size.second));
+      throw Error(ErrorCode::kOutOfMemory,
+                  fmt::format("{} x {} pixels do not fit memory; shade_rows() gives rows", size.first, size.second));
     }
   }();
   std::size_t done = 0;

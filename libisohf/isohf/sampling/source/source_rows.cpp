@@ -165,4 +165,22 @@ void SourceRows::read_to_scratch() {
   next_ += rows;
 }
 
+SourceSurvey survey_whole(HeightSource& source, const Job& job) {
+  const SourceInfo& info = source.info();
+  constexpr std::uint64_t kReadBytes = std::uint64_t{8} << 20U;
+  const ReadStep step = ReadStep::make(info, kReadBytes);
+  SourceSurvey survey(info, true);
+  std::vector<std::byte> raw;
+  for (std::int64_t row = 0; row < info.height; row += step.rows) {
+    for (const Window& window : step.windows(info, row)) {
+      job.throw_if_cancelled();
+      raw.resize(static_cast<std::size_t>(window.columns * window.rows) * size_bytes(info.sample_type));
+      source.read_window(window, raw);
+      survey.add(raw);
+    }
+    job.report({"statistics", "rows", std::min(row + step.rows, info.height), info.height});
+  }
+  return survey;
+}
+
 }  // namespace isohf

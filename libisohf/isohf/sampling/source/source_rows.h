@@ -12,8 +12,10 @@
 #include <vector>
 
 #include "isohf/base/file.h"
+#include "isohf/job.h"
 #include "isohf/raster.h"
 #include "isohf/sampling/resample/row_sampler.h"
+#include "isohf/sampling/source/source_statistics.h"
 
 namespace isohf {
 
@@ -30,6 +32,9 @@ struct ReadStep {
   /// The windows that make up the rows from `first` on, which is a multiple of `rows`.
   [[nodiscard]] std::vector<Window> windows(const SourceInfo& info, std::int64_t first) const;
 };
+
+/// The survey of all samples, with their mean. Stage "statistics". Throws Error{kCancelled}, and as reading does.
+[[nodiscard]] SourceSurvey survey_whole(HeightSource& source, const Job& job);
 
 /// Memory that others gave back, on whatever thread dropped it last: fresh memory would be cleared page by page.
 template <typename T>

@@ -98,4 +98,28 @@ std::vector<Warning> check_same_source(const ArchiveReader& archive, const Sourc
   return {};
 }
 
+void add_findings(const Metadata& metadata, const VertexReport& vertices, const AccuracyReport& surface,
+                  VerifyReport& report) {
+  const auto add = [&](int id, const std::string& text, std::optional<TileIndex> tile = {}) {
+    report.findings.push_back({id, severity_of(id), tile, text});
+    ++report.findings_total;
+  };
+  if (vertices.wrong > 0) {
+    add(finding::kVertex,
+        fmt::format("{} vertices, from this tile on, differ from the input resampled, by up to {:.6g} ({:.6g} is "
+                    "allowed), or in having an elevation",
+                    vertices.wrong, vertices.worst, vertices.bound),
+        vertices.first_wrong);
+  }
+  if (const std::string text = contradiction(metadata, surface); !text.empty()) add(finding::kAccuracy, text);
+  if (surface.lost_inside > 0) {
+    add(finding::kSourceLost,
+        fmt::format("{} elevations of the input are where the archive has none", surface.lost_inside));
+  }
+  if (surface.invented_inside > 0) {
+    add(finding::kSourceInvented,
+        fmt::format("{} nodata samples of the input are where the archive has elevations", surface.invented_inside));
+  }
+}
+
 }  // namespace isohf
