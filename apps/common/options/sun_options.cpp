@@ -10,12 +10,6 @@
 #include "options/option_values.h"
 
 namespace isohf::cli {
-namespace {
-
-/// The highest sun whose shadows are drawn.
-constexpr double kHighest_deg = 89.9;
-
-}  // namespace
 
 void add_sun_options(CLI::App& line, SunPlace& sun, std::optional<SolarTime>& date, const std::string& usual,
                      double least_deg) {
@@ -36,29 +30,28 @@ void add_sun_options(CLI::App& line, SunPlace& sun, std::optional<SolarTime>& da
       option(line, "--date", "YYYY-MM-DD", "The sun of that day over the archive's middle (Earth, Mars)",
              [&date](const std::string& text) {
                const auto [year, month, day_of_month] = parse_date(text);
-               const double hours = date ? date->hours : 12.0;
-               date = {year, month, day_of_month};
-               date->hours = hours;
+               date = {year, month, day_of_month, date ? date->hours : 12.0};
              });
   option(line, "--time", "HH:MM", "Mean solar time of that day [default: 12:00]", [&date](const std::string& text) {
-    date.value().hours = parse_time(text);
+    const double hours = parse_time(text);
+    if (date) date->hours = hours;  // else needs() refuses it
   })->needs(day);
   day->excludes(place);
 }
 
-SunPlace sun_of_day(ArchiveReader& archive, const SolarTime& time) {
+SunPlace sun_over(ArchiveReader& archive, const std::optional<SolarTime>& date, const SunPlace& sun) {
+  constexpr double kHighest_deg = 89.9;  // whose shadows are drawn
+  if (!date) return sun;
   try {
     understand_source(archive);
-  } catch (const Error&) {
-    // It may have degrees all the same; else DaySky reports it.
+  } catch (const Error&) {  // it may have degrees all the same; else DaySky reports it
   }
-  SunPlace sun = DaySky(archive).sun(time);
-  if (sun.elevation_deg < kLowestSun_deg) {
+  const SunPlace then = DaySky(archive).sun(*date);
+  if (then.elevation_deg < kLowestSun_deg) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("--time: the sun is {:.2g} degrees below the horizon then",
-                                                         std::max(0.0, -sun.elevation_deg)));
+                                                         std::max(0.0, -then.elevation_deg)));
   }
-  sun.elevation_deg = std::min(sun.elevation_deg, kHighest_deg);
-  return sun;
+  return {then.azimuth_deg, std::min(then.elevation_deg, kHighest_deg)};
 }
 
 }  // namespace isohf::cli

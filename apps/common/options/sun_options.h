@@ -19,7 +19,8 @@ inline constexpr SunPlace kUsualSun{300.0, 35.0};
 void add_sun_options(CLI::App& line, SunPlace& sun, std::optional<SolarTime>& date, const std::string& usual = "300,35",
                      double least_deg = kLowestSun_deg);
 
-/// Where the sun stands over an archive's middle. Throws Error{kInvalidArgument} if it is below the horizon.
-[[nodiscard]] SunPlace sun_of_day(ArchiveReader& archive, const SolarTime& time);
+/// The sun of --date over an archive's middle; without a date that of --sun. Throws Error{kInvalidArgument} if the sun
+/// is below the horizon.
+[[nodiscard]] SunPlace sun_over(ArchiveReader& archive, const std::optional<SolarTime>& date, const SunPlace& sun);
 
 }  // namespace isohf::cli

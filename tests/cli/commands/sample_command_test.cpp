@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -42,8 +43,7 @@ TEST_F(SampleCommand, ShadowsReachAsHighAsTheEdgeTowardsTheSunLetsThem) {
   const std::string archive = folder / "plane.isohf";
   const double surface = 1000.0 + kSlopeX * 1000.0 + kSlopeZ * 1000.0;
   const double edge = surface + kSlopeX * 990.0 - 990.0 * std::tan(8.0 * 0.017453292519943295);
-  const std::vector<std::string> sun = {"sample", archive,           "--at", "1000", "1000", "--shadow", "--azimuth",
-                                        "E",      "--sun-elevation", "8"};
+  const std::vector<std::string> sun = {"sample", archive, "--at", "1000,1000", "--shadow", "--sun", "90,8"};
   const auto with = [&](const std::vector<std::string>& more) { return run_isohf(with_more(sun, more)); };
   double numbers[8] = {};
   std::istringstream text(with({}).out);
@@ -61,22 +61,24 @@ TEST_F(SampleCommand, ShadowsReachAsHighAsTheEdgeTowardsTheSunLetsThem) {
                 std::clamp(0.5 - higher_deg / (2.0 * 959.63 / 3600.0), 0.0, 1.0), 0.02)
         << higher_deg;
   }
-  EXPECT_EQ(run_isohf({"sample", archive, "--at", "50", "50", "--shadow"}).out, "void\n");
+  EXPECT_EQ(run_isohf({"sample", archive, "--at", "50,50", "--shadow"}).out, "void\n");
 }
 
 TEST_F(SampleCommand, RefusesASunThatCastsNoShadow) {
   const std::string archive = folder / "plane.isohf";
   const auto refused = [&](const std::vector<std::string>& more) {
-    const RunResult result = run_isohf(with_more({"sample", archive, "--at", "1000", "1000"}, more));
+    const RunResult result = run_isohf(with_more({"sample", archive, "--at", "1000,1000"}, more));
     EXPECT_EQ(result.exit_code, 2);
     return result.err;
   };
   using testing::HasSubstr;
-  EXPECT_THAT(refused({"--above", "3"}), HasSubstr("--above is for --shadow, which is not given"));
-  EXPECT_THAT(refused({"--shadow", "--above", "-3"}), HasSubstr("must be 0 or more"));
-  EXPECT_THAT(refused({"--shadow", "--sun-elevation", "90"}),
-              HasSubstr("the sun must stand above 0 and below 90 degrees"));
-  EXPECT_THAT(refused({"--shadow", "--azimuth", "NW"}), HasSubstr("must be degrees from 0 to 360, or N, E, S, W"));
+  EXPECT_THAT(refused({"--above", "3"}), HasSubstr("--above requires --shadow"));
+  EXPECT_THAT(refused({"--time", "3"}), HasSubstr("--time requires --date"));
+  EXPECT_THAT(refused({"--shadow", "--time", "3"}), HasSubstr("--time requires --date"));
+  EXPECT_THAT(refused({"--shadow", "--above", "-3"}), HasSubstr("must be a number from 0"));
+  EXPECT_THAT(refused({"--shadow", "--sun", "270,90"}), HasSubstr("the sun must stand above 0 and below 90 degrees"));
+  EXPECT_THAT(refused({"--shadow", "--sun", "NW,8"}), HasSubstr("--sun: found 'NW,8'"));
+  EXPECT_THAT(refused({"--shadow", "--date", "2026-06-21"}), HasSubstr("date"));
 }
 
 TEST_F(SampleCommand, VoidOutsideCommentsAndBlankLines) {
@@ -102,23 +104,87 @@ TEST_F(SampleCommand, BadLineIsNamedAfterTheAnswersBeforeIt) {
     const RunResult result = run_isohf({"sample", folder / "plane.isohf"}, input);
     EXPECT_EQ(result.exit_code, 1);
     EXPECT_EQ(result.err,
-              std::string("isohf: standard input, line 3: found '") + bad + "', must be 'x z', two numbers\n");
+              std::string("isohf sample: standard input, line 3: found '") + bad + "', must be 'x z', two numbers\n");
     EXPECT_EQ(std::count(result.out.begin(), result.out.end(), '\n'), 1);
   }
 }
 
-TEST_F(SampleCommand, PlacesTakeACommaAsWellAsABlank) {
-  const RunResult apart = run_isohf({"sample", folder / "plane.isohf", "--at", "1000", "900", "--at", "-5", "7"});
+TEST_F(SampleCommand, PlacesAreTwoNumbers) {
+  const RunResult apart = run_isohf({"sample", folder / "plane.isohf", "--at", "1000,900", "--at", "-5,7"});
   ASSERT_EQ(apart.exit_code, 0) << apart.err;
-  for (const std::vector<std::string>& places :
-       std::vector<std::vector<std::string>>{{"--at", "1000,900", "--at", "-5,7"},
-                                             {"--at=1000,900", "--at", "-5,", "7"},
-                                             {"--at", "1000", "900", "--at=-5,7"}}) {
-    const RunResult result = run_isohf(with_more(with_more({"sample"}, places), {folder / "plane.isohf"}));
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    EXPECT_EQ(result.out, apart.out);
+  EXPECT_EQ(run_isohf({"sample", "--at=1000 900", folder / "plane.isohf", "--at=-5 , 7"}).out, apart.out);
+  for (const char* wrong : {"1,2,3", "1", "1,x", "1,", "inf,2", ""}) {
+    EXPECT_EQ(run_isohf({"sample", folder / "plane.isohf", "--at", wrong}).exit_code, 2) << wrong;
   }
-  EXPECT_EQ(run_isohf({"sample", folder / "plane.isohf", "--at", "1,2,3"}).exit_code, 2);
+}
+
+/// One place, in every kind of coordinates: the archive lies in UTM zone 32N.
+TEST_F(SampleCommand, PlacesAreReadAndPrintedInAnyCoordinates) {
+  std::string grid = "ncols 60\nnrows 50\nxllcorner 399000\nyllcorner 5000000\ncellsize 20\n";
+  for (int i = 0; i < 60 * 50; ++i) grid += std::to_string(i % 60) + ' ';
+  write_file(folder / "utm.asc", grid);
+  ASSERT_EQ(run_isohf({"convert", folder / "utm.asc", folder / "utm.isohf", "--crs", "EPSG:32632", "-q"}).exit_code, 0);
+  const auto sample = [&](const std::vector<std::string>& more) {
+    return run_isohf(with_more({"sample", folder / "utm.isohf"}, more));
+  };
+  const std::vector<std::string> way_there = {"--at",   "399500,5000600", "--in",   "crs",
+                                              "--with", "EPSG:2056",      "--with", "lonlat"};
+  const RunResult answer = sample(with_more(way_there, {"--json"}));
+  ASSERT_EQ(answer.exit_code, 0) << answer.err;
+  const json there = json::parse(answer.out);
+  EXPECT_EQ(there.at("x"), 500.0);
+  EXPECT_EQ(there.at("z"), 400.0);
+  EXPECT_EQ(there.at("crs").at("x"), 399500.0);
+  const double longitude = there.at("lonlat").at("longitude").get<double>();
+  const double latitude = there.at("lonlat").at("latitude").get<double>();
+  EXPECT_NEAR(longitude, 7.7275, 0.01);
+  const double east = there.at("with").at("EPSG:2056").at("x").get<double>();
+  const double north = there.at("with").at("EPSG:2056").at("y").get<double>();
+  EXPECT_GT(east, 2.0e6);
+  // The text has the same, in the order in which it was asked for.
+  std::istringstream words(sample(way_there).out);
+  double numbers[10] = {};
+  for (double& number : numbers) words >> number;
+  EXPECT_NEAR(numbers[0], there.at("elevation").get<double>(), 1e-6);
+  EXPECT_NEAR(numbers[6], east, 1e-4);
+  EXPECT_NEAR(numbers[8], longitude, 1e-9);
+  // And back from each of them.
+  write_file(folder / "swiss.prj",
+             "+proj=somerc +lat_0=46.9524055555556 +lon_0=7.43958333333333 +k_0=1 +x_0=2600000 "
+             "+y_0=1200000 +ellps=bessel +towgs84=674.374,15.056,405.346,0,0,0,0 +units=m");
+  for (const auto& [system, place] :
+       std::vector<std::pair<std::string, std::string>>{{"lonlat", fmt::format("{},{}", longitude, latitude)},
+                                                        {"EPSG:4326", fmt::format("{},{}", longitude, latitude)},
+                                                        {"EPSG:2056", fmt::format("{},{}", east, north)},
+                                                        {folder / "swiss.prj", fmt::format("{},{}", east, north)}}) {
+    const RunResult back = sample({"--at", place, "--in", system, "--json"});
+    ASSERT_EQ(back.exit_code, 0) << back.err;
+    EXPECT_NEAR(json::parse(back.out).at("x").get<double>(), 500.0, 2.0) << system;
+    EXPECT_NEAR(json::parse(back.out).at("z").get<double>(), 400.0, 2.0) << system;
+  }
+  EXPECT_THAT(sample({"--at", "1,1", "--in", "lonlta"}).err, testing::HasSubstr("lonlta"));
+  // An archive that does not say where it lies has world coordinates alone.
+  const RunResult nowhere = run_isohf({"sample", folder / "plane.isohf", "--at", "1,1", "--in", "EPSG:2056"});
+  EXPECT_EQ(nowhere.exit_code, 2);
+  EXPECT_EQ(nowhere.out, "");
+}
+
+TEST_F(SampleCommand, AWarningSaysHowAPlaceOutsideMayHaveBeenMeant) {
+  std::string grid = "ncols 60\nnrows 50\nxllcorner 7\nyllcorner 46\ncellsize 0.001\n";
+  for (int i = 0; i < 60 * 50; ++i) grid += "1 ";
+  write_file(folder / "alps.asc", grid);
+  ASSERT_EQ(run_isohf({"convert", folder / "alps.asc", folder / "alps.isohf", "--crs", "EPSG:4326", "-q"}).exit_code,
+            0);
+  const auto hint = [&](const std::string& place, const std::string& in) {
+    const RunResult result = run_isohf({"sample", folder / "alps.isohf", "--at", place, "--in", in});
+    EXPECT_EQ(result.out, "outside\n");
+    EXPECT_EQ(result.exit_code, 0);
+    return result.err;
+  };
+  using testing::HasSubstr;
+  EXPECT_THAT(hint("46.02,7.03", "lonlat"), HasSubstr("read as latitude, longitude it lies inside"));
+  EXPECT_THAT(hint("347500,5098500", "crs"), HasSubstr("easting, northing in UTM zone 32N"));
+  EXPECT_EQ(hint("-20,-30", "lonlat"), "");
 }
 
 TEST_F(SampleCommand, ALineIsAnsweredBeforeTheNextIsSent) {
