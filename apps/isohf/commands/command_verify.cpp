@@ -1,9 +1,9 @@
-/// isohf verify: is an archive whole, and how far is it from what it was made from?
+/// isohf verify: checks that an archive is whole, and measures its distance from its input.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -15,7 +15,6 @@
 #include "input/options_source.h"
 #include "input/source_inputs.h"
 #include "isohf/error.h"
-#include "isohf/raster.h"
 #include "isohf/surface.h"
 #include "isohf/verify.h"
 #include "isohf/verify/accuracy/same_source.h"
@@ -24,8 +23,7 @@
 #include "options/describe.h"
 #include "options/option_values.h"
 #include "options/work_options.h"
-#include "output/accuracy_output.h"
-#include "output/json_output.h"
+#include "output/report.h"
 #include "output/standard_output.h"
 
 namespace isohf::cli {
@@ -36,18 +34,17 @@ using nlohmann::ordered_json;
 constexpr const char* kVerifyFooter =
     R"(Each finding is one line: its number, its severity, where, what. Exit code 0: nothing above a note was found;
 3: something was, or the surface is further from INPUT than allowed; 1: the check itself failed.
-The input is read as the archive says that it was read.
+INPUT is read with the options that the archive records.
 
 Examples:
   isohf verify dem.isohf
   isohf verify archives/ --json       one JSON object a line
   isohf verify dem.isohf --against dem.tif --max-error 5)";
 
-struct VerifyCommandOptions {
+struct VerifyOptions {
   const Common& common;
   WorkOptions work{};
   std::vector<std::string> archives{};
-  std::string archive{};  ///< the one in hand
   std::vector<std::string> against{};
   GeoidRequest geoid{};
   std::optional<double> max_error{};
@@ -55,25 +52,85 @@ struct VerifyCommandOptions {
 };
 
 const char* to_word(Severity severity) {
-  switch (severity) {
-    case Severity::kNote:
-      return "note";
-    case Severity::kWarning:
-      return "warning";
-    case Severity::kError:
-      return "error";
+  constexpr const char* kWords[] = {"note", "warning", "error"};
+  return kWords[static_cast<std::size_t>(severity)];
+}
+
+/// The archive's input, read with the options that its record has. Throws Error.
+std::unique_ptr<HeightSource> open_as_recorded(const VerifyOptions& options, const Metadata& metadata) {
+  const SourceRecord& record = metadata.source;
+  const std::vector<std::string> files = expand_inputs(options.against, false);
+  RecordedInput input = recorded_input(record.options.value_or(RecordedOptions{}));
+  input.open.unpacked_bytes = options.work.unpacked_bytes(input.open.unpacked_bytes);
+  if (!options.geoid.path.empty()) {
+    input.geoid = options.geoid;
+  } else if (!input.geoid.path.empty()) {
+    input.geoid.path = (std::filesystem::path(files.front()).parent_path() / input.geoid.path).string();
   }
-  return "?";
+  if (!input.open.registration) input.open.registration = record.registration;
+  // Inputs of different reference systems were joined in that of the record.
+  if (const std::string system = system_text(source_georeference(record).system); record.mosaic && !system.empty()) {
+    input.inputs.onto = ProjectionRequest::parse(system);
+  }
+  const auto open = [&] {
+    OpenedInputs opened = open_inputs(files, input.inputs, input.open, options.work);
+    const bool repeats_column = record.repeats_column && opened.source->info().width == record.width + 1;
+    GroundRequest ground;
+    ground.wrap = metadata.wraps_x || repeats_column ? Wrap::kAlways : Wrap::kNever;
+    return laid_out(std::move(opened.source), input.geoid, ground, true);
+  };
+  std::unique_ptr<HeightSource> source = open();
+  const SourceInfo& info = source->info();
+  const bool is_scaled = input.open.z_scale || input.open.z_offset;
+  if (!is_scaled || (info.z_scale == record.z_scale && info.z_offset == record.z_offset)) return source;
+  // A raster of isohf export states the scale with these options in it.
+  input.open.z_scale.reset();
+  input.open.z_offset.reset();
+  return open();
+}
+
+struct Accuracy {
+  VertexReport vertices;
+  AccuracyReport surface;
+};
+
+Accuracy compare(const VerifyOptions& options, const std::string& path, const Job& job, ProgressDisplay& display) {
+  ArchiveReader archive = open_archive(path);
+  const Metadata& metadata = archive.metadata();
+  std::unique_ptr<HeightSource> source;
+  try {
+    source = open_as_recorded(options, metadata);
+  } catch (const Error& error) {
+    throw error.within(path);
+  }
+  const SourceInfo& info = source->info();
+  const auto same_system = are_same(source_georeference(metadata.source).system, info.georeference.system);
+  const std::vector<Warning> warnings = check_same_source(archive, info, same_system);
+  display.clear();
+  print_warnings(options.common, warnings);
+  if (is_warped(metadata)) understand_source(archive);
+  return {check_vertices(archive, *source, job), compare_with_source(archive, *source, job)};
+}
+
+/// Why the measured error is more than was allowed; empty if it is not.
+std::string why_too_far(const VerifyOptions& options, const AccuracyReport& accuracy) {
+  const auto exceeds = [](const char* what, double found, const std::optional<double>& most) {
+    if (!most || found <= *most) return std::string();
+    return fmt::format("the {} error is {:.6g}, at most {:.6g} is allowed", what, found, *most);
+  };
+  const std::string largest = exceeds("largest", accuracy.max, options.max_error);
+  return largest.empty() ? exceeds("rms", accuracy.rms, options.max_rms) : largest;
 }
 
 ordered_json checks_of(const VerifyReport& report) {
   ordered_json findings = ordered_json::array();
   for (const Finding& finding : report.findings) {
-    ordered_json json = {{"id", finding_name(finding.id)}, {"severity", to_word(finding.severity)}};
-    json["tile"] = finding.tile ? ordered_json{{"column", finding.tile->column}, {"row", finding.tile->row}}
-                                : ordered_json(nullptr);
-    json["text"] = spelled(finding.text);
-    findings.push_back(std::move(json));
+    ordered_json tile;
+    if (finding.tile) tile = {{"column", finding.tile->column}, {"row", finding.tile->row}};
+    findings.push_back({{"id", finding_name(finding.id)},
+                        {"severity", to_word(finding.severity)},
+                        {"tile", tile},
+                        {"text", spelled(finding.text)}});
   }
   return {{"passed", report.passed()},
           {"tiles_checked", report.tiles_checked},
@@ -82,199 +139,134 @@ ordered_json checks_of(const VerifyReport& report) {
           {"findings", findings}};
 }
 
-std::string text_from(const Finding& finding) {
-  std::string text = finding_name(finding.id) + " " + to_word(finding.severity);
-  if (finding.tile) text += fmt::format(" tile ({},{})", finding.tile->column, finding.tile->row);
-  return text + ": " + printable(spelled(finding.text)) + "\n";
+std::string text_from(const VerifyReport& report) {
+  std::string text;
+  for (const Finding& finding : report.findings) {
+    const std::string tile =
+        finding.tile ? fmt::format(" tile ({},{})", finding.tile->column, finding.tile->row) : std::string();
+    text += fmt::format("{} {}{}: {}\n", finding_name(finding.id), to_word(finding.severity), tile,
+                        printable(spelled(finding.text)));
+  }
+  const std::int64_t not_listed = report.findings_total - static_cast<std::int64_t>(report.findings.size());
+  if (not_listed > 0) text += fmt::format("and {} more\n", describe_count(not_listed));
+  return text;
 }
 
-/// What the comparison found beside errors of size: ground that is missing or made up, away from borders of voids.
-void add_findings(const Accuracy& measured, const std::string& contradiction, VerifyReport& report) {
-  const AccuracyReport& accuracy = measured.surface;
-  const VertexReport& vertices = measured.vertices;
-  const auto add = [&](int id, std::int64_t count, const std::string& what, std::optional<TileIndex> tile = {}) {
-    if (count == 0) return;
-    report.findings.push_back({id, severity_of(id), tile, fmt::format("{} {}", describe_count(count), what)});
-    ++report.findings_total;
-  };
-  add(finding::kVertex, vertices.wrong,
-      fmt::format("vertices, from this tile on, differ from the input resampled, by up to {:.6g} where {:.6g} is "
-                  "allowed, or in being void",
-                  vertices.worst, vertices.bound),
-      vertices.first_wrong);
-  if (!contradiction.empty()) {
-    report.findings.push_back({finding::kAccuracy, severity_of(finding::kAccuracy), {}, contradiction});
-    ++report.findings_total;
+void add_accuracy(const Accuracy& measured, const std::string& input, Report& report) {
+  const auto& [vertices, found] = measured;
+  report.add("against",
+             {{"samples", found.samples},
+              {"samples_void", found.samples_void},
+              {"samples_compared", found.samples_compared},
+              {"samples_off_map", found.samples_off_map},
+              {"samples_lost", found.samples_lost},
+              {"lost_inside", found.lost_inside},
+              {"samples_invented", found.samples_invented},
+              {"invented_inside", found.invented_inside},
+              {"rms", found.rms},
+              {"max", found.max},
+              {"p99", found.p99},
+              {"psnr_db", found.psnr_db},
+              {"worst", {{"x", found.worst.x}, {"z", found.worst.z}}},
+              {"vertices",
+               {{"checked", vertices.vertices},
+                {"voids", vertices.voids},
+                {"clamped", vertices.clamped},
+                {"wrong", vertices.wrong},
+                {"bound", vertices.bound},
+                {"worst", vertices.worst}}}},
+             "against",
+             fmt::format("{}: {} of {} samples compared, {} nodata in the input{}", input,
+                         describe_count(found.samples_compared), describe_count(found.samples),
+                         describe_count(found.samples_void),
+                         found.samples_off_map > 0
+                             ? fmt::format(", {} not on the archive's map", describe_count(found.samples_off_map))
+                             : ""));
+  if (found.samples_lost + found.samples_invented > 0) {
+    report.line("nodata", fmt::format("{} samples have no surface, {} nodata samples have one; {} and {} of them away "
+                                      "from borders of nodata",
+                                      describe_count(found.samples_lost), describe_count(found.samples_invented),
+                                      describe_count(found.lost_inside), describe_count(found.invented_inside)));
   }
-  add(finding::kSourceLost, accuracy.lost_inside, "elevations of the input lie where the archive has none");
-  add(finding::kSourceInvented, accuracy.invented_inside, "voids of the input lie where the archive has elevations");
+  report.line("error",
+              fmt::format("rms {:.6g}, 99 % within {:.6g}, largest {:.6g} at x {:.9g} z {:.9g}, PSNR {:.1f} dB",
+                          found.rms, found.p99, found.max, found.worst.x, found.worst.z, found.psnr_db));
+  report.detail(
+      "vertices",
+      fmt::format("{} resampled once more: largest difference {:.6g}, at most {:.6g} is rounding, "
+                  "{} clamped",
+                  describe_count(vertices.vertices), vertices.worst, vertices.bound, describe_count(vertices.clamped)));
 }
 
-/// The geoid of an archive's record, beside the inputs or in the working folder.
-void find_geoid(const std::string& archive, const std::vector<std::string>& files, GeoidRequest& geoid) {
-  const std::string name = geoid.path;
-  for (const std::string& path : {(std::filesystem::path(files.front()).parent_path() / name).string(), name}) {
-    std::error_code ignored;
-    geoid.path = path;
-    if (std::filesystem::exists(path, ignored)) return;
-  }
-  throw Error(ErrorCode::kInvalidArgument,
-              fmt::format("{}: was made with --geoid {}, which lies neither beside the input nor in this folder; give "
-                          "--geoid FILE",
-                          archive, name));
-}
-
-/// The archive's input, read as it was read then.
-std::unique_ptr<HeightSource> open_as_recorded(const VerifyCommandOptions& options, const Metadata& metadata) {
-  const SourceRecord& record = metadata.source;
-  const std::vector<std::string> files = expand_inputs(options.against, false);
-  const RecordedOptions recorded = record.options.value_or(RecordedOptions{});
-  RecordedInput input = [&] {
-    try {
-      return recorded_input(recorded);
-    } catch (const Error& error) {
-      throw error.within(options.archive);
-    }
-  }();
-  input.open.unpacked_bytes = options.work.unpacked_bytes(input.open.unpacked_bytes);
-  if (!options.geoid.path.empty()) {
-    input.geoid = options.geoid;
-  } else if (!input.geoid.path.empty()) {
-    find_geoid(options.archive, files, input.geoid);
-  }
-  if (!input.open.registration) input.open.registration = record.registration;
-  // Inputs of different reference systems were joined in that of the record.
-  if (const std::string system = system_text(source_georeference(record).system); record.mosaic && !system.empty()) {
-    ProjectionRequest& onto = input.inputs.onto;
-    onto.is_auto = false;
-    onto.is_given = true;
-    onto.kind = ProjectionKind::kSystem;
-    onto.system = system;
-  }
-  GroundRequest ground;
-  const auto open = [&] {
-    OpenedInputs opened = open_inputs(files, input.inputs, input.open, options.work);
-    const bool repeats_column = record.repeats_column && opened.source->info().width == record.width + 1;
-    ground.wrap = metadata.wraps_x || repeats_column ? Wrap::kAlways : Wrap::kNever;
-    return laid_out(std::move(opened.source), input.geoid, ground, true);
-  };
-  const auto is_scaled_alike = [&](const HeightSource& source) {
-    return source.info().z_scale == record.z_scale && source.info().z_offset == record.z_offset;
-  };
-  try {
-    std::unique_ptr<HeightSource> source = open();
-    if (!(input.open.z_scale || input.open.z_offset) || is_scaled_alike(*source)) return source;
-    // What export wrote states the scale with these options in it.
-    input.open.z_scale.reset();
-    input.open.z_offset.reset();
-    std::unique_ptr<HeightSource> exported = open();
-    if (is_scaled_alike(*exported)) return exported;
-    return source;
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::kInvalidArgument || input.open.reference_system.empty()) throw;
-    throw error.within(options.archive + ": was made with --crs");
-  }
-}
-
-/// What of the measured error is more than was allowed; empty where nothing is.
-std::string why_too_far(const VerifyCommandOptions& options, const AccuracyReport& accuracy) {
-  if (options.max_error && accuracy.max > *options.max_error) {
-    return fmt::format("the largest error is {:.6g}, at most {:.6g} is allowed", accuracy.max, *options.max_error);
-  }
-  if (options.max_rms && accuracy.rms > *options.max_rms) {
-    return fmt::format("the rms error is {:.6g}, at most {:.6g} is allowed", accuracy.rms, *options.max_rms);
-  }
-  return {};
-}
-
-int check_one(const VerifyCommandOptions& options, bool is_one_of_many) {
-  std::optional<ProgressDisplay> display(std::in_place, options.common, options.work.progress);
+int check(const VerifyOptions& options, const std::string& path, bool is_one_of_many) {
+  const Common& common = options.common;
+  std::optional<ProgressDisplay> display(std::in_place, common, options.work.progress);
   const Job job = job_from(options.work, *display);
-  VerifyReport report = verify_archive(options.archive, job);
-  if (!report.findings.empty() && report.findings.front().id == finding::kNotReadable) {
-    if (const std::string what = what_else(options.archive); !what.empty()) {
-      report.findings.front().text = options.archive + ": " + what;
-    }
+  VerifyReport checks = verify_archive(path, job);
+  if (!checks.findings.empty() && checks.findings.front().id == finding::kNotReadable) {
+    if (const std::string what = what_else(path); !what.empty()) checks.findings.front().text = path + ": " + what;
   }
   std::optional<Accuracy> accuracy;
   // An archive that is not whole has no surface to measure.
-  const bool compares = !options.against.empty() && report.passed();
-  if (compares) {
-    const ArchiveReader archive = open_archive(options.archive);
-    const Metadata& metadata = archive.metadata();
-    const std::unique_ptr<HeightSource> source = open_as_recorded(options, metadata);
-    const SourceInfo& info = source->info();
-    const auto same_system = are_same(source_georeference(metadata.source).system, info.georeference.system);
-    for (const Warning& warning : check_same_source(archive, info, same_system)) {
-      display->clear();
-      print_warning(options.common, warning);
-    }
-    accuracy = measure_accuracy(options.archive, *source, job);
-    add_findings(*accuracy, contradiction(metadata, accuracy->surface), report);
+  const bool is_whole = checks.passed();
+  if (is_whole && !options.against.empty()) {
+    accuracy = compare(options, path, job, *display);
+    add_findings(ArchiveReader(path).metadata(), accuracy->vertices, accuracy->surface, checks);
   }
   display.reset();
   const std::string too_far = accuracy ? why_too_far(options, accuracy->surface) : "";
-  const bool passed = report.passed() && too_far.empty();
+  const bool passed = checks.passed() && too_far.empty();
 
-  StandardOutput out(options.common);
-  if (options.common.json) {
-    ordered_json document = {{"archive", options.archive}, {"passed", passed}, {"checks", checks_of(report)}};
-    if (accuracy) document["against"] = json_from(*accuracy);
-    if (!too_far.empty()) document["difference"] = too_far;
-    out.write(is_one_of_many ? json_line(document) : json_text(document));
-  } else if (!options.common.quiet) {
-    for (const Finding& finding : report.findings) out.write(text_from(finding));
-    const std::int64_t not_listed = report.findings_total - static_cast<std::int64_t>(report.findings.size());
-    if (not_listed > 0) out.write(fmt::format("and {} more\n", describe_count(not_listed)));
-    if (accuracy) out.write(text_from(*accuracy, fmt::format("{}", fmt::join(options.against, " "))));
-    if (!options.against.empty() && !compares) out.write("not compared with the input: the archive is not whole\n");
-    if (!too_far.empty()) out.write("difference: " + too_far + "\n");
-    out.write(fmt::format("{}: {}: {} tiles and {} shared vertices checked, {} findings\n", printable(options.archive),
-                          passed ? "passed" : "FAILED", describe_count(report.tiles_checked),
-                          describe_count(report.shared_vertices_checked), describe_count(report.findings_total)));
+  Report report;
+  report.add("archive", path);
+  report.add("passed", passed);
+  report.add("checks", checks_of(checks));
+  if (accuracy) add_accuracy(*accuracy, fmt::format("{}", fmt::join(options.against, " ")), report);
+  if (!is_whole && !options.against.empty()) report.line("against", "not compared: the archive is not whole");
+  if (!too_far.empty()) report.add("difference", too_far, "difference", too_far);
+  StandardOutput out(common);
+  const bool prints_text = !common.json && !common.quiet;
+  if (prints_text) out.write(text_from(checks));
+  out.flush();
+  report.print(common, is_one_of_many);
+  if (prints_text) {
+    out.write(fmt::format("{}: {}: {} tiles and {} shared vertices checked, {} findings\n", printable(path),
+                          passed ? "passed" : "FAILED", describe_count(checks.tiles_checked),
+                          describe_count(checks.shared_vertices_checked), describe_count(checks.findings_total)));
   }
   out.finish();
   return passed ? kExitDone : kExitDifferences;
 }
 
-int run(const VerifyCommandOptions& options) {
+int run(const VerifyOptions& options) {
   const std::vector<std::string> files = list_files(options.archives, true);
   if (files.size() > 1 && !options.against.empty()) {
     throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("--against compares one archive with its input, {} archives are given; every file of "
-                            "a mosaic wants an --against of its own (--against a.tif --against b.tif), or one "
-                            "pattern in quotes takes them all (--against \"*.tif\")",
+                fmt::format("--against compares one archive with its input, {} archives are given. Give each file of a "
+                            "mosaic its own --against (--against a.tif --against b.tif), or all as one pattern in "
+                            "quotes (--against \"*.tif\")",
                             files.size()));
   }
-  return for_each_file(files, options.common, [&](const std::string& file) {
-    VerifyCommandOptions one = options;
-    one.archive = file;
-    return check_one(one, files.size() > 1);
-  });
+  return for_each_file(files, options.common,
+                       [&](const std::string& file) { return check(options, file, files.size() > 1); });
 }
 
 }  // namespace
 
 Run add_verify(CLI::App& line, Common& common) {
-  const auto kept = std::make_shared<VerifyCommandOptions>(VerifyCommandOptions{common});
-  VerifyCommandOptions& options = *kept;
+  const auto kept = std::make_shared<VerifyOptions>(VerifyOptions{common});
+  VerifyOptions& options = *kept;
   positionals(line, "ARCHIVE...", "Archives to check: files, folders of .isohf, \"patterns*\" and @lists",
               options.archives)
       ->required();
   group(line, "Comparison");
-  CLI::Option* const against = repeated(line, "--against", "INPUT",
-                                        "Measure the surface against the raster it was made from; for a mosaic a "
-                                        "folder, \"pattern*\" or @list, or several "
-                                        "--against",
-                                        [&options](const std::string& text) { options.against.push_back(text); });
+  CLI::Option* const against =
+      repeated(line, "--against", "INPUT",
+               "Measure the surface against the raster it was made from. For a mosaic give a folder, \"pattern*\" or "
+               "@list, or several --against",
+               [&options](const std::string& text) { options.against.push_back(text); });
   const auto limit = [](std::optional<double>& value) {
-    return [&value](const std::string& text) {
-      double found = 0.0;
-      if (!read_number(text, found) || !(found >= 0.0)) {
-        throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', must be a number of at least 0");
-      }
-      value = found;
-    };
+    return [&value](const std::string& text) { value = parse_number_in(text, 0.0, HUGE_VAL); };
   };
   option(line, "--max-error", "E", "Exit with 3 if a sample is off by more than E", limit(options.max_error))
       ->needs(against);
@@ -283,6 +275,7 @@ Run add_verify(CLI::App& line, Common& common) {
   add_geoid_option(line, options.geoid)->needs(against);
   add_work_options(line, options.work, common);
   add_memory_option(line, options.work);
+  most_used(line, {"--against", "--max-error", "--max-rms"});
   line.footer(kVerifyFooter);
   return [kept] {
     std::error_code none;

@@ -98,7 +98,7 @@ TEST_F(VerifyAgainst, TakesTheOptionsOfTheInputFromTheArchive) {
         {"--nodata", "0,65535"},
         {"--valid-range", "400:600"},
         {"--fill"},
-        {"--fill-distance", "3"},
+        {"--fill=3"},
         {"--fill", "--valid-range", "400:600"},
         {"--registration", "point"},
         {"--registration", "area"},
@@ -114,7 +114,7 @@ TEST_F(VerifyAgainst, TakesTheOptionsOfTheInputFromTheArchive) {
       {"plain.bin",
        {{"--raw", "60x45:u16le"},
         {"--raw", "120x45:u8", "--z-scale", "2", "--registration", "area", "--sample-spacing", "3", "--nodata", "9"},
-        {"--raw", "60x45:u16le", "--valid-range", "450:600", "--fill-distance", "9"}}},
+        {"--raw", "60x45:u16le", "--valid-range", "450:600", "--fill=9"}}},
       {"land.flt",
        {{},
         {"--bbox", "5.1,44.1,5.4,44.3"},
@@ -128,7 +128,7 @@ TEST_F(VerifyAgainst, TakesTheOptionsOfTheInputFromTheArchive) {
        {{}, {"--no-wrap"}, {"--wrap-x", "--lossless"}, {"--geoid", folder / "small.pgm"}, {"--bbox=170,-20,-170,20"}}},
       {"tiles",
        {{"--recursive"},
-        {"--recursive", "--overlap", "first"},
+        {"--recursive", "--on-top", "first"},
         {"--recursive", "--bbox", "5.2,44.1,5.5,44.3", "--fill"}}},
   };
   for (const auto& [input, options] : cases) {
@@ -151,8 +151,8 @@ TEST_F(VerifyAgainst, SaysWhichGeoidIsMissing) {
   std::filesystem::create_directory(folder / "elsewhere");
   std::filesystem::rename(folder / "small.pgm", folder / "elsewhere/small.pgm");
   const RunResult missing = verify("land.flt");
-  EXPECT_EQ(missing.exit_code, 2);
-  EXPECT_THAT(missing.err, HasSubstr("was made with --geoid small.pgm, which lies neither beside the input nor in"));
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_THAT(missing.err, HasSubstr("a.isohf: " + (folder / "small.pgm")));
   EXPECT_EQ(verify("land.flt", {"--geoid", folder / "elsewhere/small.pgm:to-orthometric"}).exit_code, 0);
 }
 
@@ -206,15 +206,15 @@ TEST_F(VerifyAgainst, TakesOptionsOfAnInputAloneFromTheArchive) {
     EXPECT_EQ(run_isohf({"verify", folder / "b.isohf", "-q"}).exit_code, 0) << "the archive is whole";
     const RunResult result = run_isohf({"verify", folder / "b.isohf", "--against", folder / "land.flt"});
     EXPECT_EQ(result.exit_code, 1) << result.out;
-    EXPECT_THAT(result.err, HasSubstr("b.isohf: isohf.json: source.options: " + name + ": " + why));
+    EXPECT_THAT(result.err, testing::AllOf(HasSubstr("b.isohf: isohf.json: source.options: " + name), HasSubstr(why)));
     EXPECT_EQ(result.out, "");
   };
   for (const char* const other : {"against", "config", "geoid-file", "help", "json", "memory", "overwrite", "quiet",
-                                  "strict", "threads", "tmpdir", "verbose", "version", "INPUT", "-q", ""}) {
+                                  "strict", "threads", "verbose", "version", "INPUT", "-q", ""}) {
     refused(other, "true", "is not an option of an input");
   }
-  refused("geoid", "../small.pgm", "found '../small.pgm', must be a name without a folder");
-  refused("fill", "perhaps", "found 'perhaps', must be true");
+  refused("geoid", "../small.pgm", "must be a name without a folder");
+  refused("fill", "perhaps", "found 'perhaps', must be");
   refused("registration", "nowhere", "found 'nowhere', must be");
 }
 
@@ -239,7 +239,7 @@ TEST_F(VerifyAgainst, TakesWhatWasCutFromACoarsePlane) {
   for (const Words& with : std::vector<Words>{{}, {"--outside", "void"}, {"--type", "f32"}}) {
     ASSERT_EQ(convert("land.flt", with_more({"--shape", "12x19", "--density", "2"}, with)).exit_code, 0);
     const std::string plane = folder / "plane.isohf";
-    ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", plane, "--plane", "1", "--overwrite"}).exit_code, 0);
+    ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", plane, "--overview", "1", "--overwrite"}).exit_code, 0);
     const RunResult sound = run_isohf({"verify", plane, "--against", folder / "land.flt"});
     EXPECT_EQ(sound.exit_code, 0) << sound.out << sound.err;
     write_degrees(folder / "other", kColumns, kRows, 5.0, 44.0, 0.01, [](double, double) { return 400.0; });
