@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "isohf/restore/source_size.h"
 #include "options/describe.h"
 
 namespace isohf::cli {
@@ -29,6 +30,18 @@ std::string describe_estimate(const ErrorEstimate& estimate, const std::string& 
       "error of about {:.3g}{} (rms); the largest of {} samples looked at is {:.3g}{}: an estimate{}", estimate.rms,
       unit, describe_count(estimate.samples), estimate.largest, unit,
       estimate.lost > 0 ? fmt::format("; {} more next to nodata have no surface", describe_count(estimate.lost)) : "");
+}
+
+std::string describe_size(const Metadata& metadata, std::uint64_t tile_bytes) {
+  const SizeBesideSource size(metadata, tile_bytes);
+  const std::string text = fmt::format("elevations take {}, {:.3f} bits a source sample", describe_bytes(tile_bytes),
+                                       size.bits_per_source_sample);
+  if (size.ratio_to_source == 0.0) return text;
+  const bool is_smaller = size.ratio_to_source >= 1.0;
+  return text + fmt::format(": {:.2f} times {} the source's {} of {}",
+                            is_smaller ? size.ratio_to_source : 1.0 / size.ratio_to_source,
+                            is_smaller ? "smaller than" : "as large as", describe_bytes(size.source_bytes),
+                            metadata.source.sample_type);
 }
 
 }  // namespace isohf::cli

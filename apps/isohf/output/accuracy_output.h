@@ -13,4 +13,7 @@ namespace isohf::cli {
 /// Says that it is an estimate, or why there is none.
 [[nodiscard]] std::string describe_estimate(const ErrorEstimate& estimate, const std::string& unit);
 
+/// "elevations take 1.2 MB, 3.1 bits a source sample: 5.1 times smaller than the source's 6.3 MB of int16".
+[[nodiscard]] std::string describe_size(const Metadata& metadata, std::uint64_t tile_bytes);
+
 }  // namespace isohf::cli

@@ -5,162 +5,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <nlohmann/json.hpp>
-#include <optional>
-#include <vector>
 
-#include "input/source_place.h"
-#include "interrupt.h"
+#include "formats/georeference/reference_system.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/base/file.h"
-#include "isohf/convert/frame/plan.h"
 #include "isohf/error.h"
-#include "isohf/raster.h"
 #include "isohf/sampling/source/source_rows.h"
-#include "isohf/sampling/source/source_statistics.h"
 #include "options/describe.h"
-#include "output/json_output.h"
-#include "output/progress.h"
 #include "output/standard_output.h"
 
 namespace isohf::cli {
 namespace {
 
 using nlohmann::ordered_json;
-
-struct RasterInfo {
-  SourceInfo source;
-  std::string library;
-  Registration registration = Registration::kPoint;  ///< as used
-  std::optional<SourcePlace> place;
-  std::optional<SourceSurvey> survey;
-};
-
-Registration registration_used(const Georeference& place) {
-  if (place.registration != Registration::kUnknown) return place.registration;
-  return place.has_origin ? Registration::kArea : Registration::kPoint;
-}
-
-SourceSurvey survey(HeightSource& source, const Common& common) {
-  const std::atomic<bool>& cancel = watch_interrupts();
-  ProgressDisplay display(common, ProgressMode::kAuto);
-  const SourceInfo& info = source.info();
-  constexpr std::uint64_t kReadBytes = std::uint64_t{8} << 20U;
-  const ReadStep step = ReadStep::make(info, kReadBytes);
-  SourceSurvey survey(info, true);
-  std::vector<std::byte> raw;
-  for (std::int64_t row = 0; row < info.height; row += step.rows) {
-    for (const Window& window : step.windows(info, row)) {
-      if (cancel.load(std::memory_order_relaxed)) throw Error(ErrorCode::kCancelled, "interrupted");
-      raw.resize(static_cast<std::size_t>(window.columns * window.rows) * size_bytes(info.sample_type));
-      source.read_window(window, raw);
-      survey.add(raw);
-    }
-    display.update("statistics", "rows", std::min(row + step.rows, info.height), info.height);
-  }
-  return survey;
-}
-
-const char* unit_name(const Georeference& place) {
-  switch (place.unit) {
-    case HorizontalUnit::kMetre:
-      return place.metres_per_unit == 1.0 ? "metre" : "linear";
-    case HorizontalUnit::kDegree:
-      return "degree";
-    case HorizontalUnit::kUnknown:
-      break;
-  }
-  return "unknown";
-}
-
-std::string describe_unit(const Georeference& place) {
-  const std::string name = unit_name(place);
-  if (name == "linear") return fmt::format("units of {:.9g} m", place.metres_per_unit);
-  return name == "unknown" ? "units not known" : name + "s";
-}
-
-std::string describe_reference(const ReferenceSystem& system) {
-  std::string text = system.name;
-  const auto add = [&](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
-  if (system.epsg) add(fmt::format("EPSG:{}", *system.epsg));
-  if (!system.body.empty()) add(system.body);
-  if (system.semi_major_axis_m) {
-    const double inverse_flattening = system.inverse_flattening.value_or(0.0);
-    add(fmt::format("radius {:.10g} m", *system.semi_major_axis_m) +
-        (inverse_flattening > 0.0 ? fmt::format(", flattening 1/{:.10g}", inverse_flattening) : ", sphere"));
-  }
-  if (text.empty()) text = system.wkt.empty() ? "not known" : "as WKT (--json prints it)";
-  if (!system.vertical_datum.empty()) add("heights above " + system.vertical_datum);
-  if (system.vertical_epsg) add(fmt::format("vertical EPSG:{}", *system.vertical_epsg));
-  return text;
-}
-
-bool is_from_file(const RasterInfo& raster) {
-  return raster.source.georeference.registration != Registration::kUnknown;
-}
-
-std::string describe_registration(const RasterInfo& raster) {
-  std::string text = to_string(raster.registration);
-  text += raster.registration == Registration::kArea ? ": samples in the middle of pixels" : ": samples on posts";
-  if (is_from_file(raster)) return text + ", as the file says";
-  return text + (raster.source.georeference.has_origin ? ", taken for granted with a georeference"
-                                                       : ", taken for granted without a georeference");
-}
-
-std::string describe_voids(const SourceInfo& info) {
-  std::string text;
-  const bool is_transparency = info.void_values.size() == 1 && !is_floating(info.sample_type) &&
-                               info.valid_min == info.void_values.front() + 1.0 && !std::isfinite(info.valid_max);
-  if (is_transparency) return fmt::format("transparent samples, read as {}", info.void_values.front());
-  for (const double value : info.void_values) text += fmt::format("{}, ", value);
-  if (is_floating(info.sample_type)) text += "NaN and infinities, ";
-  if (std::isfinite(info.valid_min) || std::isfinite(info.valid_max)) {
-    text += fmt::format("samples outside {} to {}, ", info.valid_min, info.valid_max);
-  }
-  if (text.empty()) return "none declared";
-  return text.substr(0, text.size() - 2);
-}
-
-std::string text_from(const RasterInfo& raster) {
-  const SourceInfo& info = raster.source;
-  const Georeference& place = info.georeference;
-  std::string text;
-  const auto say = [&](const char* what, const std::string& value) {
-    text += fmt::format("{:<12} {}\n", what, printable(value));
-  };
-  say("raster", fmt::format("{}: {}, read by {}", info.path, info.format, raster.library));
-  say("size", fmt::format("{} x {} {}{}, stored in blocks of {} x {}", info.width, info.height,
-                          to_string(info.sample_type), info.channel.empty() ? "" : ", channel " + info.channel,
-                          info.block_width > 0 ? info.block_width : info.width, info.block_height));
-  if (place.has_origin) {
-    say("place", fmt::format("first sample at {:.12g} East, {:.12g} North ({})", place.origin_x, place.origin_y,
-                             describe_unit(place)));
-  } else {
-    say("place", "not known");
-  }
-  say("spacing", fmt::format("{:.12g} between columns, {:.12g} between rows{}", place.spacing_x, place.spacing_y,
-                             place.has_origin ? "" : fmt::format(" ({})", describe_unit(place))));
-  if (raster.place) text += text_from(*raster.place);
-  say("registration", describe_registration(raster));
-  say("reference", describe_reference(place.system));
-  say("elevations", (info.z_scale == 1.0 && info.z_offset == 0.0
-                         ? std::string("samples as they are")
-                         : fmt::format("sample * {:.12g} + {:.12g}", info.z_scale, info.z_offset)) +
-                        ", unit " + (info.vertical_unit.empty() ? "not known" : info.vertical_unit));
-  say("voids", describe_voids(info));
-  if (raster.survey) {
-    const SourceScan scan = raster.survey->scan();
-    if (scan.valid > 0) {
-      say("range", fmt::format("{:.9g} .. {:.9g}, mean {:.9g}", scan.range.min, scan.range.max,
-                               raster.survey->mean().value_or(0.0)));
-    } else {
-      say("range", "no elevation at all");
-    }
-    say("samples",
-        fmt::format("{}, {} of them void", describe_count(scan.valid + scan.voids), describe_count(scan.voids)));
-  }
-  return text;
-}
 
 /// JSON has no numbers that are not finite.
 ordered_json number_or_text(double value) {
@@ -177,56 +34,44 @@ ordered_json or_null(const std::optional<T>& value) {
   return value ? ordered_json(*value) : ordered_json(nullptr);
 }
 
-ordered_json document_of(const SourceSurvey& survey) {
+const char* unit_word(const Georeference& place) {
+  if (place.unit == HorizontalUnit::kDegree) return "degree";
+  if (place.unit == HorizontalUnit::kUnknown) return "unknown";
+  return place.metres_per_unit == 1.0 ? "metre" : "linear";
+}
+
+std::string describe_nodata(const SourceInfo& info) {
+  const bool is_transparency = info.void_values.size() == 1 && !is_floating(info.sample_type) &&
+                               info.valid_min == info.void_values.front() + 1.0 && !std::isfinite(info.valid_max);
+  if (is_transparency) return fmt::format("transparent samples, read as {}", info.void_values.front());
+  std::string text;
+  for (const double value : info.void_values) text += fmt::format("{}, ", value);
+  if (is_floating(info.sample_type)) text += "NaN and infinities, ";
+  if (std::isfinite(info.valid_min) || std::isfinite(info.valid_max)) {
+    text += fmt::format("samples outside {} to {}, ", info.valid_min, info.valid_max);
+  }
+  return text.empty() ? "none declared" : text.substr(0, text.size() - 2);
+}
+
+void add_statistics(const SourceSurvey& survey, Report& report) {
   const SourceScan scan = survey.scan();
+  const bool has_elevations = scan.valid > 0;
   ordered_json undeclared = ordered_json::array();
   for (const UndeclaredVoid& found : survey.undeclared_voids()) {
     undeclared.push_back({{"value", found.value}, {"count", found.count}});
   }
-  return {{"samples", scan.valid + scan.voids},
-          {"voids", scan.voids},
-          {"min", scan.valid > 0 ? ordered_json(scan.range.min) : ordered_json(nullptr)},
-          {"max", scan.valid > 0 ? ordered_json(scan.range.max) : ordered_json(nullptr)},
-          {"mean", or_null(survey.mean())},
-          {"undeclared_voids", undeclared}};
-}
-
-ordered_json document_of(const RasterInfo& raster, const std::vector<Warning>& warnings) {
-  const SourceInfo& info = raster.source;
-  const Georeference& place = info.georeference;
-  const ReferenceSystem& system = place.system;
-  ordered_json voids = ordered_json::array();
-  for (const double value : info.void_values) voids.push_back(number_or_text(value));
-  ordered_json json;
-  json["raster"] = info.path;
-  json["format"] = info.format;
-  json["library"] = raster.library;
-  json["width"] = info.width;
-  json["height"] = info.height;
-  json["sample_type"] = to_string(info.sample_type);
-  json["channel"] = or_null(info.channel);
-  json["block"] = {{"width", info.block_width > 0 ? info.block_width : info.width}, {"height", info.block_height}};
-  json["origin"] =
-      place.has_origin ? ordered_json{{"x", place.origin_x}, {"y", place.origin_y}} : ordered_json(nullptr);
-  json["spacing"] = {{"x", place.spacing_x}, {"y", place.spacing_y}};
-  json["unit"] = unit_name(place);
-  json["metres_per_unit"] = place.unit == HorizontalUnit::kMetre ? ordered_json(place.metres_per_unit) : nullptr;
-  add_source_place(raster.place, json);
-  json["registration"] = to_string(raster.registration);
-  json["registration_from"] = is_from_file(raster) ? "file" : "default";
-  json["crs"] = {{"name", or_null(system.name)}, {"epsg", or_null(system.epsg)}, {"wkt", or_null(system.wkt)}};
-  json["body"] = {{"name", or_null(system.body)},
-                  {"semi_major_axis_m", or_null(system.semi_major_axis_m)},
-                  {"inverse_flattening", or_null(system.inverse_flattening)}};
-  json["vertical_datum"] = {{"name", or_null(system.vertical_datum)}, {"epsg", or_null(system.vertical_epsg)}};
-  json["vertical_unit"] = or_null(info.vertical_unit);
-  json["z_scale"] = info.z_scale;
-  json["z_offset"] = info.z_offset;
-  json["void_values"] = voids;
-  json["valid_samples"] = {{"min", number_or_text(info.valid_min)}, {"max", number_or_text(info.valid_max)}};
-  json["statistics"] = raster.survey ? document_of(*raster.survey) : ordered_json(nullptr);
-  json["warnings"] = warnings;
-  return json;
+  const ordered_json statistics = {{"samples", scan.valid + scan.voids},
+                                   {"voids", scan.voids},
+                                   {"min", has_elevations ? ordered_json(scan.range.min) : ordered_json(nullptr)},
+                                   {"max", has_elevations ? ordered_json(scan.range.max) : ordered_json(nullptr)},
+                                   {"mean", or_null(survey.mean())},
+                                   {"undeclared_voids", undeclared}};
+  report.add("statistics", statistics, "range",
+             has_elevations ? fmt::format("{:.9g} .. {:.9g}, mean {:.9g}", scan.range.min, scan.range.max,
+                                          survey.mean().value_or(0.0))
+                            : "no elevation at all");
+  report.line("samples", fmt::format("{}, {} of them nodata", describe_count(scan.valid + scan.voids),
+                                     describe_count(scan.voids)));
 }
 
 }  // namespace
@@ -244,33 +89,122 @@ bool is_archive(const std::string& path, const OpenOptions& options) {
   return is_zip || path.ends_with(".isohf");
 }
 
-void print_raster_info(const std::string& path, const OpenOptions& options, bool with_statistics, const Common& common,
-                       bool is_one_of_many) {
+std::string describe_reference(const ReferenceSystem& system) {
+  std::string text = system.name;
+  const auto add = [&](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
+  if (system.epsg) add(fmt::format("EPSG:{}", *system.epsg));
+  if (system.body != "Earth") {
+    if (!system.body.empty()) add(system.body);
+    if (system.semi_major_axis_m) add(fmt::format("radius {:.10g} m", *system.semi_major_axis_m));
+  }
+  if (text.empty()) text = system.wkt.empty() ? "not known" : "as WKT (--json prints it)";
+  if (!system.vertical_datum.empty()) add("heights above " + system.vertical_datum);
+  if (system.vertical_epsg) add(fmt::format("vertical EPSG:{}", *system.vertical_epsg));
+  return text;
+}
+
+void add_place(const std::optional<SourcePlace>& place, Report& report) {
+  for (const char* member : {"bounds", "centre", "lonlat", "map_scale"}) report.add(member, nullptr);
+  if (!place) return;
+  const MapBounds& bounds = place->bounds;
+  const MapPoint middle = bounds.middle();
+  report.add("bounds", {{"west", bounds.west}, {"south", bounds.south}, {"east", bounds.east}, {"north", bounds.north}},
+             "bounds",
+             fmt::format("{:.12g} to {:.12g} East, {:.12g} to {:.12g} North", bounds.west, bounds.east, bounds.south,
+                         bounds.north));
+  report.add("centre", {{"x", middle.easting}, {"y", middle.northing}});
+  report.detail("centre", fmt::format("{:.12g} East, {:.12g} North", middle.easting, middle.northing));
+  if (!place->ground) {
+    if (!place->why_no_ground.empty()) report.line("lon/lat", "not known: " + place->why_no_ground);
+    return;
+  }
+  const ordered_json ground = ordered_json::parse(format_ground(*place->ground));
+  report.add("lonlat", {{"bounds", ground["bounds"]}, {"centre", ground["centre"]}});
+  if (!place->has_map_scale) return;
+  const GeoExtent& extent = place->ground->extent;
+  const GeoPoint& centre = place->ground->centre;
+  report.line("lon/lat", fmt::format("{}, latitude {:.9g} to {:.9g}{}",
+                                     extent.east - extent.west > 360.0 - 1e-6
+                                         ? "all longitudes"
+                                         : fmt::format("longitude {:.9g} to {:.9g}", extent.west, extent.east),
+                                     extent.south, extent.north,
+                                     std::isfinite(centre.longitude)
+                                         ? fmt::format("; centre {:.9g}, {:.9g}", centre.longitude, centre.latitude)
+                                         : ""));
+  report.add("map_scale", ground["map_scale"]);
+  const std::string scale = describe_map_scale(*place->ground);
+  const bool is_true = place->ground->worst_error <= MapGround::kTrueEnough;
+  is_true ? report.detail("map scale", scale) : report.line("map scale", scale);
+}
+
+RasterInfo describe_raster(const std::string& path, const OpenOptions& options, const Job* statistics) {
   const std::unique_ptr<HeightSource> source = open_raster(path, options);
-  RasterInfo raster;
-  raster.source = source->info();
+  const SourceInfo info = source->info();
+  const Georeference& place = info.georeference;
+  const ReferenceSystem& system = place.system;
   const Format* const format = native_format_of(path, options);
-  raster.library = format != nullptr ? library_of(*format) : "OpenImageIO";
-  const Georeference& place = raster.source.georeference;
-  raster.registration = registration_used(place);
-  raster.place =
-      source_place(place, raster.source.width, raster.source.height, raster.registration == Registration::kArea);
-  std::vector<Warning> warnings = raster.source.warnings;
-  if (with_statistics) {
-    raster.survey = survey(*source, common);
-    if (const std::string warning = raster.survey->warning(); !warning.empty()) warnings.push_back(warning);
+  const std::string library = format != nullptr ? library_of(*format) : "OpenImageIO";
+  const bool is_from_file = place.registration != Registration::kUnknown;
+  const Registration registration = is_from_file       ? place.registration
+                                    : place.has_origin ? Registration::kArea
+                                                       : Registration::kPoint;
+  const bool is_area = registration == Registration::kArea;
+  const std::int64_t block_width = info.block_width > 0 ? info.block_width : info.width;
+  std::vector<Warning> warnings = info.warnings;
+
+  RasterInfo raster;
+  Report& report = raster.report;
+  report.add("raster", info.path, "raster",
+             fmt::format("{}: {}, {} x {} {}{}", info.path, info.format, info.width, info.height,
+                         to_string(info.sample_type), info.channel.empty() ? "" : ", channel " + info.channel));
+  report.add("format", info.format);
+  report.add("library", library);
+  report.add("width", info.width);
+  report.add("height", info.height);
+  report.add("sample_type", to_string(info.sample_type));
+  report.add("channel", or_null(info.channel));
+  report.add("block", {{"width", block_width}, {"height", info.block_height}});
+  report.detail("stored", fmt::format("in blocks of {} x {}, read by {}", block_width, info.block_height, library));
+  report.add("crs", {{"name", or_null(system.name)}, {"epsg", or_null(system.epsg)}, {"wkt", or_null(system.wkt)}},
+             "reference", describe_reference(system));
+  report.add("origin", place.has_origin ? ordered_json{{"x", place.origin_x}, {"y", place.origin_y}} : nullptr);
+  if (!place.has_origin) report.line("bounds", "not known");
+  add_place(source_place(place, info.width, info.height, registration), report);
+  report.add("spacing", {{"x", place.spacing_x}, {"y", place.spacing_y}}, "spacing",
+             fmt::format("{:.12g} between columns, {:.12g} between rows, in {}", place.spacing_x, place.spacing_y,
+                         unit_name(place)));
+  report.add("unit", unit_word(place));
+  report.add("metres_per_unit",
+             place.unit == HorizontalUnit::kMetre ? ordered_json(place.metres_per_unit) : ordered_json(nullptr));
+  report.add("registration", to_string(registration), "registration",
+             fmt::format("{}: samples {}{}", to_string(registration), is_area ? "at the centres of pixels" : "on posts",
+                         is_from_file ? "" : ", by default"));
+  report.add("registration_from", is_from_file ? "file" : "default");
+  report.add("body", {{"name", or_null(system.body)},
+                      {"semi_major_axis_m", or_null(system.semi_major_axis_m)},
+                      {"inverse_flattening", or_null(system.inverse_flattening)}});
+  report.add("vertical_datum", {{"name", or_null(system.vertical_datum)}, {"epsg", or_null(system.vertical_epsg)}});
+  report.add("vertical_unit", or_null(info.vertical_unit), "elevations",
+             fmt::format("{}, unit {}",
+                         info.z_scale == 1.0 && info.z_offset == 0.0
+                             ? "samples as they are"
+                             : fmt::format("sample * {:.12g} + {:.12g}", info.z_scale, info.z_offset),
+                         info.vertical_unit.empty() ? "not known" : info.vertical_unit));
+  report.add("z_scale", info.z_scale);
+  report.add("z_offset", info.z_offset);
+  ordered_json voids = ordered_json::array();
+  for (const double value : info.void_values) voids.push_back(number_or_text(value));
+  report.add("void_values", voids, "nodata", describe_nodata(info));
+  report.add("valid_samples", {{"min", number_or_text(info.valid_min)}, {"max", number_or_text(info.valid_max)}});
+  report.add("statistics", nullptr);
+  if (statistics != nullptr) {
+    const SourceSurvey survey = survey_whole(*source, *statistics);
+    add_statistics(survey, report);
+    if (const std::string warning = survey.warning(); !warning.empty()) warnings.push_back(warning);
   }
-  std::vector<Warning> named;
-  for (const Warning& warning : warnings) named.push_back(warning.reworded(path + ": " + warning));
-  print_warnings(common, named);
-  StandardOutput out(common);
-  if (common.json) {
-    const ordered_json document = document_of(raster, warnings);
-    out.write(is_one_of_many ? json_line(document) : json_text(document));
-  } else if (!common.quiet) {
-    out.write(text_from(raster));
-  }
-  out.finish();
+  report.add("warnings", json_from(warnings));
+  for (const Warning& warning : warnings) raster.warnings.push_back(warning.reworded(path + ": " + warning));
+  return raster;
 }
 
 }  // namespace isohf::cli

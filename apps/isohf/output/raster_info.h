@@ -1,19 +1,32 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
+#include "formats/georeference/source_place.h"
 #include "formats/registry.h"
+#include "isohf/job.h"
 #include "isohf/raster.h"
-#include "options/work_options.h"
+#include "output/report.h"
 
 namespace isohf::cli {
 
-/// True where `isohf info` should take the file for an archive: a ZIP file that begins with our metadata, or that no
-/// reader of rasters knows; or a file named .isohf that none knows. Throws Error{kIo, kCorrupt} as open_raster.
+/// True if `isohf info` treats the file as an archive: a ZIP file that begins with our metadata, or that no reader of
+/// rasters knows; or a file named .isohf that none knows. Throws Error{kIo, kCorrupt} as open_raster.
 [[nodiscard]] bool is_archive(const std::string& path, const OpenOptions& options);
 
-/// Prints what is understood of a raster; `with_statistics` reads all of it. JSON of one of many takes a line.
-void print_raster_info(const std::string& path, const OpenOptions& options, bool with_statistics, const Common& common,
-                       bool is_one_of_many);
+/// Warnings of a raster, each naming it, and what is understood of it.
+struct RasterInfo {
+  std::vector<Warning> warnings;
+  Report report;
+};
+/// statistics  reads all samples, as this job
+[[nodiscard]] RasterInfo describe_raster(const std::string& path, const OpenOptions& options, const Job* statistics);
+
+/// Members bounds, centre, lonlat and map_scale (null if not known), and their lines.
+void add_place(const std::optional<SourcePlace>& place, Report& report);
+
+/// "WGS 84 / UTM zone 32N, EPSG:32632, heights above EGM96".
+[[nodiscard]] std::string describe_reference(const ReferenceSystem& system);
 
 }  // namespace isohf::cli

@@ -20,6 +20,10 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 
+std::int64_t line_count(const std::string& text) {
+  return std::count(text.begin(), text.end(), '\n');
+}
+
 class InfoCommand : public testing::Test {
  protected:
   InfoCommand() {
@@ -34,6 +38,15 @@ class InfoCommand : public testing::Test {
 
   TemporaryFolder folder;
 };
+
+TEST_F(InfoCommand, ADozenLinesAreEnoughAndVerboseHasMore) {
+  const std::string archive = run_isohf({"info", folder / "a.isohf"}).out;
+  EXPECT_LE(line_count(archive), 12) << archive;
+  EXPECT_GE(line_count(run_isohf({"info", folder / "a.isohf", "-v"}).out), line_count(archive) + 3);
+  const std::string raster = run_isohf({"info", folder / "a.tif"}).out;
+  EXPECT_LE(line_count(raster), 10) << raster;
+  EXPECT_GT(line_count(run_isohf({"info", folder / "a.tif", "-v"}).out), line_count(raster));
+}
 
 TEST_F(InfoCommand, SaysThatTransparentSamplesAreVoids) {
   RasterSpec spec;
@@ -51,11 +64,10 @@ TEST_F(InfoCommand, SaysThatTransparentSamplesAreVoids) {
 }
 
 TEST_F(InfoCommand, SaysThatTheSourcesSamplesAreKept) {
-  EXPECT_THAT(run_isohf({"info", folder / "a.isohf"}).out, HasSubstr("lossless     no"));
+  EXPECT_THAT(run_isohf({"info", folder / "a.isohf"}).out, testing::Not(HasSubstr("lossless")));
   ASSERT_EQ(run_isohf({"convert", folder / "a.tif", folder / "b.isohf", "--lossless", "-q"}).exit_code, 0);
   const std::string text = run_isohf({"info", folder / "b.isohf"}).out;
   EXPECT_THAT(text, HasSubstr("export gives the float32 samples bit for bit; residuals of "));
-  EXPECT_THAT(text, HasSubstr("residual/ (1 members, "));
 }
 
 TEST_F(InfoCommand, ComparesAnExtractWithTheSamplesOnItsGround) {
@@ -75,7 +87,6 @@ TEST_F(InfoCommand, ComparesAnExtractWithTheSamplesOnItsGround) {
         json::parse(run_isohf({"info", folder / "p.isohf", "--json"}).out).at("source_samples").get<std::uint64_t>();
     if (column == 0) {
       EXPECT_GT(bits("p.isohf"), bits("a.isohf")) << "where all the elevations are";
-      EXPECT_THAT(run_isohf({"info", folder / "p.isohf"}).out, HasSubstr(" of float32 there\n"));
     }
   }
   EXPECT_NEAR(static_cast<double>(samples), 20000.0, static_cast<double>(columns));
@@ -99,6 +110,11 @@ TEST_F(InfoCommand, TilesAreListedOneALine) {
   EXPECT_LT(stored, count);  // the void half stores nothing
   EXPECT_EQ(info.at("tile_bytes"), bytes);
 
+  // The same on one line, where it is one of many documents.
+  const std::string lines = run_isohf({"info", folder / "a.isohf", folder / "a.isohf", "--json", "--tiles"}).out;
+  EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 2);
+  EXPECT_EQ(json::parse(lines.substr(0, lines.find('\n'))), info);
+
   const RunResult text = run_isohf({"info", folder / "a.isohf", "--tiles"});
   EXPECT_EQ(static_cast<std::size_t>(std::count(text.out.begin(), text.out.end(), '\n')), count + 1);
   EXPECT_THAT(text.out, HasSubstr(" 0 void void all\n"));
@@ -108,7 +124,7 @@ TEST_F(InfoCommand, StatisticsOfARasterAreReadWhenAskedFor) {
   const RunResult stats = run_isohf({"info", folder / "a.tif", "--stats"});
   EXPECT_EQ(stats.err, "");
   EXPECT_THAT(stats.out, HasSubstr("0 .. 297, mean 148.5\n"));
-  EXPECT_THAT(stats.out, HasSubstr("20 000, 10 000 of them void\n"));
+  EXPECT_THAT(stats.out, HasSubstr("20 000, 10 000 of them nodata\n"));
 
   const json info = json::parse(run_isohf({"info", folder / "a.tif", "--json", "--stats"}).out);
   EXPECT_EQ(info.at("width"), 200);
@@ -142,9 +158,10 @@ TEST_F(InfoCommand, WarnsOfVoidsThatAreNotDeclared) {
     const std::string warning = spike_warning(folder, [&](std::int64_t c, std::int64_t r) {
       return c == 7 && r < 3 ? static_cast<std::int16_t>(mark) : land(c, r);
     });
-    EXPECT_EQ(warning, fmt::format("isohf: warning: {}: 3 samples hold {}, far from all others (100 to 336): if that "
-                                   "means no elevation, give --nodata {}\n",
-                                   folder / "s.tif", mark, mark));
+    EXPECT_EQ(warning,
+              fmt::format("isohf info: warning: {}: 3 samples hold {}, far from all others (100 to 336): if that "
+                          "means no elevation, give --nodata {}\n",
+                          folder / "s.tif", mark, mark));
   }
   // Convert says the same; with --nodata nobody does.
   EXPECT_THAT(run_isohf({"convert", folder / "s.tif", folder / "s.isohf"}).err, HasSubstr("3 samples hold 32767"));

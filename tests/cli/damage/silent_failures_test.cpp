@@ -97,7 +97,7 @@ TEST_F(SilentFailures, VoidsBeyondTheValidRangeAreVoidInWhatRestoreWrites) {
   run({"convert", "a.nc", "a.isohf", "--lossless", "-q"});
   const RunResult restored = run({"export", "a.isohf", "a.tif"});
   EXPECT_EQ(restored.err, "");
-  EXPECT_THAT(run({"info", "a.tif", "--stats"}).out, HasSubstr("1 of them void"));
+  EXPECT_THAT(run({"info", "a.tif", "--stats"}).out, HasSubstr("1 of them nodata"));
 }
 
 TEST_F(SilentFailures, TheValidRangeCountsWhatItRemovesAndWarnsOfNothing) {
@@ -193,7 +193,7 @@ TEST_F(SilentFailures, GroundThatNoSourceOfAVrtCoversIsVoid) {
   for (const char* type : {"Int16", "Float32", "Byte"}) {
     for (const char* nodata : {"", "<NoDataValue>0</NoDataValue>"}) {
       vrt(type, nodata);
-      EXPECT_THAT(run({"info", "--stats", "a.vrt"}).out, HasSubstr("32 of them void")) << type << nodata;
+      EXPECT_THAT(run({"info", "--stats", "a.vrt"}).out, HasSubstr("32 of them nodata")) << type << nodata;
       // Half of it, and the four nines that the option names.
       EXPECT_THAT(run({"convert", "a.vrt", "a.isohf", "--overwrite", "--nodata", "9"}).out,
                   HasSubstr("36 samples of the input"))
