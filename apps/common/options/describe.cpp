@@ -10,25 +10,18 @@ namespace isohf::cli {
 
 std::string describe_bytes(std::uint64_t bytes) {
   if (bytes < 1000) return fmt::format("{} bytes", bytes);
-  constexpr const char* kUnits[] = {"kB", "MB", "GB", "TB", "PB", "EB"};
+  constexpr const char* kUnits = "kMGTPE";
   double value = static_cast<double>(bytes) / 1000.0;
-  std::size_t unit = 0;
-  while (value >= 999.5 && unit + 1 < std::size(kUnits)) {
-    value /= 1000.0;
-    ++unit;
-  }
-  return fmt::format("{:.3g} {}", value, kUnits[unit]);
+  const char* unit = kUnits;
+  for (; value >= 999.5; ++unit) value /= 1000.0;  // 2^64 bytes are 18 EB
+  return fmt::format("{:.3g} {}B", value, *unit);
 }
 
 std::string describe_count(std::int64_t count) {
-  const std::string digits = std::to_string(count);
-  std::string out;
-  for (std::size_t i = 0; i < digits.size(); ++i) {
-    const bool starts_group = i > 0 && digits[i - 1] != '-' && (digits.size() - i) % 3 == 0;
-    if (starts_group) out += ' ';
-    out += digits[i];
-  }
-  return out;
+  std::string text = std::to_string(count);
+  const std::size_t first = count < 0 ? 1 : 0;
+  for (std::size_t end = text.size(); end > first + 3; end -= 3) text.insert(end - 3, 1, ' ');
+  return text;
 }
 
 std::string describe_seconds(double seconds) {
@@ -46,11 +39,10 @@ std::string describe_length(double length, bool metres) {
 
 std::string describe_projection(const ProjectionRecord& record) {
   const double worst = 100.0 * record.worst_scale_error;
-  const std::string error =
-      worst < 1000.0 ? fmt::format("lengths err by up to {:.3g} %", worst) : std::string("lengths err by any amount");
-  const double longitude = std::remainder(record.worst_place.longitude, 360.0);
-  return fmt::format("{}; {} (at longitude {:.6g}, latitude {:.6g}); {}", describe_projection(record.spec), error,
-                     longitude, record.worst_place.latitude, record.why);
+  return fmt::format("{}; lengths err by {} (at longitude {:.6g}, latitude {:.6g}); {}",
+                     describe_projection(record.spec),
+                     worst < 1000.0 ? fmt::format("up to {:.3g} %", worst) : "any amount",
+                     std::remainder(record.worst_place.longitude, 360.0), record.worst_place.latitude, record.why);
 }
 
 std::string describe_map_scale(const MapGround& ground) {
@@ -80,15 +72,7 @@ std::string describe_textures(const TextureInfo& info) {
 }
 
 int raw_bytes(CodeType type) {
-  switch (type) {
-    case CodeType::kU8:
-      return 1;
-    case CodeType::kU16:
-      return 2;
-    case CodeType::kF32:
-      return 4;
-  }
-  return 0;
+  return type == CodeType::kU8 ? 1 : type == CodeType::kU16 ? 2 : 4;
 }
 
 }  // namespace isohf::cli
