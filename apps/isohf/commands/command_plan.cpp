@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 
 #include "commands/command.h"
 #include "input/convert_setup.h"
 #include "input/input_files.h"
-#include "input/source_size.h"
 #include "isohf/convert/frame/plan.h"
 #include "isohf/convert/memory_plan.h"
 #include "isohf/error.h"
@@ -117,7 +117,7 @@ Report report_of(const SourceInfo& info, const Plan& plan, const MemoryPlan& mem
   report.add("shape", json_from(shape));
   report.add("grid", json_from(grid), "tiles",
              fmt::format("{} x {} of {}x{}, {} levels, aspect {:.5f}, {} triangles each", grid.tile_columns(),
-                         grid.tile_rows(), shape.columns(), shape.rows(), shape.levels(), triangle_aspect(grid),
+                         grid.tile_rows(), shape.columns(), shape.rows(), shape.levels(), grid.sigma_x() * std::numbers::sqrt3 / grid.sigma_z(),
                          describe_count(shape.triangle_count())));
   report.add("density", plan.density, "lattice",
              fmt::format("columns {} apart, rows {}; {:.4g} vertices per sample", length(2.0 * grid.sigma_x()),
