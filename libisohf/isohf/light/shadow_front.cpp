@@ -13,15 +13,16 @@ constexpr float kNoCaster = -std::numeric_limits<float>::infinity();
 /// Lanes this near to the end of those that cast shadows count as on it: ends are found by quotients.
 constexpr double kOnEnd = 1e-6;
 
-/// SunEdge in floats.
+/// SunEdge in floats. What falls in many steps does in doubles: a line's caster is then the same one, however far it lies.
 struct Edge {
-  float fall, widening, side, offset, least, steep, most, deepest, low, high;
+  double fall;
+  float widening, side, offset, least, steep, most, deepest, low, high;
 };
 
 /// Lines between the ground at west[i] and east[i], `share` of the way. Voids cast nothing; a line beside one lies over
 /// the ground on its other side.
 ISOHF_KERNEL void move_lines(const float* west, const float* east, int count, float share, Edge edge, float none,
-                             float* __restrict heights, float* __restrict widths, float* __restrict hidden) {
+                             float* __restrict heights, float* __restrict steps, float* __restrict hidden) {
   for (int i = 0; i < count; ++i) {
     const float a = west[i];
     const float b = east[i];
@@ -29,17 +30,19 @@ ISOHF_KERNEL void move_lines(const float* west, const float* east, int count, fl
     const bool whole = between == between;
     const float beside = a == a ? a : b;
     const float ground = whole ? between : beside;
-    const float dark = heights[i] - edge.fall;
-    const float width = widths[i] + edge.widening;
+    const float ran = steps[i] + 1.0F;
+    const double dark = static_cast<double>(heights[i]) - static_cast<double>(ran) * edge.fall;
+    const float width = ran * edge.widening;
     // `none` is -infinity where ground casts no shadows, else 0.
     const float caster = whole ? between + none : kNoCaster;
-    heights[i] = caster > dark ? caster : dark;
-    widths[i] = caster > dark ? 0.0F : width;
+    const bool casts = static_cast<double>(caster) > dark;
+    heights[i] = casts ? caster : heights[i];
+    steps[i] = casts ? 0.0F : ran;
     float wide = edge.least + width * edge.steep;
     wide = wide < edge.most ? wide : edge.most;
     wide = width > wide ? width : wide;
     const float limit = wide > edge.deepest ? wide : edge.deepest;
-    float depth = dark - ground + edge.side * width + edge.offset;
+    float depth = static_cast<float>(dark - static_cast<double>(ground)) + edge.side * width + edge.offset;
     // NaN, where there is no ground, counts as lit.
     depth = depth > -limit ? depth : -limit;
     depth = depth < limit ? depth : limit;
@@ -106,9 +109,16 @@ void ShadowFront::advance(const float* profile, const Casting& casting, float* h
   for (std::size_t e = 0; e < edges_.size(); ++e) {
     const SunEdge& of = edges_[e];
     const auto in_float = [](double value) { return static_cast<float>(value); };
-    const Edge edge{in_float(of.fall),  in_float(of.widening), in_float(of.side), in_float(of.offset),
-                    in_float(of.least), in_float(of.steep),    in_float(of.most), in_float(of.deepest),
-                    0.5F - range_,      0.5F + range_};
+    const Edge edge{of.fall,
+                    in_float(of.widening),
+                    in_float(of.side),
+                    in_float(of.offset),
+                    in_float(of.least),
+                    in_float(of.steep),
+                    in_float(of.most),
+                    in_float(of.deepest),
+                    0.5F - range_,
+                    0.5F + range_};
     const auto move = [&](int begin, int end, float none) {
       if (begin >= end) return;
       const float* const west = profile + begin - 1;

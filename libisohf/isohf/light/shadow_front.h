@@ -7,9 +7,10 @@
 ///
 ///   lanes   0   1   2   3   4        A step is a row of heights, one in each lane. Lines of light pass through all
 ///   step 0  o\  o\  o\  o\  o\       steps, a lane's width apart, and drift by `shift` lanes at each. For an edge of
-///   step 1  o \ o \ o \ o \ o \      the sun a line carries the height up to which it is dark, and how wide the penumbra
-///   step 2  o  \o  \o  \o  \o        has grown since the caster. On a step the ground under a line is taken between
-///                                    the two lanes beside it; where it rises above the line's height it becomes that.
+///   step 1  o \ o \ o \ o \ o \      the sun a line carries its caster: its height, and how many steps ago it was. From
+///   step 2  o  \o  \o  \o  \o        them follow the height up to which it is dark, and the penumbra's width. On a step
+///                                    the ground under a line is taken between the two lanes beside it; where it rises
+///                                    above the dark it becomes the caster.
 ///                                    Nothing else mixes lines: a shadow stays as sharp after a thousand steps as it was.
 ///
 /// What is hidden of the sun is found under each line, and interpolated on a lane between the two lines beside it.
@@ -60,7 +61,7 @@ class ShadowFront {
   /// Gives the line that arrives between lane 0 and 1 what it carries: what comes from the band before; null: nothing.
   void let_in(const float* carried);
 
-  /// What all lines carry, and going on from that with that step.
+  /// What all lines carry, [edges][casters' heights, steps since][lanes + 1], and going on from that with that step.
   [[nodiscard]] const std::vector<float>& lines() const { return lines_; }
   void resume(std::int64_t step, const std::vector<float>& lines);
 
@@ -70,7 +71,7 @@ class ShadowFront {
   float range_;
   std::int64_t steps_ = 0;
   std::size_t count_;          ///< lanes + 1; line l lies between lanes l - 1 and l
-  std::vector<float> lines_;   ///< [edges][heights, widths][count]
+  std::vector<float> lines_;   ///< [edges][heights, steps][count]
   std::vector<float> hidden_;  ///< [count] under the lines
 };
 
