@@ -587,7 +587,7 @@ def shadow_seeds(payload, columns, rows, kind, edges):
         above = []
         for r in range(1, rows - 1):
             near = [((d + 1) // 2 if r % 2 else d // across * (columns - 3) + (d % across + 1) // 2, h) for d, h in above]
-            n, h, p, above = 0, edges[direction][r], 0, []
+            n, h, p, above = 1, edges[direction][r], 0, []
             for _ in range(len(near) + unzigzag(number(0))):
                 while p < len(near) and near[p][0] <= n:
                     p += 1
@@ -854,15 +854,18 @@ class Archive:
             order = range(self.grid["columns"])
             for i in order if direction == 0 else reversed(order):
                 tile, name = j * self.grid["columns"] + i, "seeds/%d/%d.seed" % (j, i)
-                edges = [[none] + [none if (v := self.height(tile, 1 if way == 0 else last(r), r)) is None else v
+                edges = [[none] + [none if (v := self.height(tile, 0 if way == 0 else last(r) + 1, r)) is None else v
                                    for r in range(1, rows - 1)] for way in (0, 1)]
                 found = None
                 if name in self.members:
                     seen += direction
                     found = shadow_seeds(self.member(name), columns, rows, self.kind, edges)
                 for (k, r), s in entering.items():
-                    edge = number(edges[direction][r])
-                    stated = [edge]
+                    edge = self.height(tile, 1 if direction == 0 else last(r), r)
+                    edge = -math.inf if edge is None else number(edge)
+                    stated, padding = [edge, -math.inf], edges[direction][r]
+                    if i != order[0 if direction == 0 else -1] and padding != none:
+                        stated += [number(padding) - (2 if r % 2 else 1) * falls[k]]
                     if found:
                         stated += [number(h) - d * falls[k] for d, h in found[direction, 0, r]]
                     slack = 1e-6 * max(1, abs(s) if s > -math.inf else 0)

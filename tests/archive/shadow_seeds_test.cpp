@@ -16,7 +16,6 @@ namespace isohf {
 namespace {
 
 constexpr CodeType kAllTypes[] = {CodeType::kU16, CodeType::kU8, CodeType::kF32};
-constexpr double kNone = -HUGE_VAL;
 
 TileCodes random_tile(const TileShape& shape, CodeType type, std::mt19937& random) {
   TileCodes tile;
@@ -40,7 +39,7 @@ CasterRows random_casters(const TileShape& shape, CodeType type, std::int64_t ve
   CasterRows rows;
   rows.starts.push_back(0);
   for (int row = 1; row <= visible_rows(shape); ++row) {
-    std::int64_t place = 0;
+    std::int64_t place = 1;  // the padding's
     for (std::size_t left = vertices == 0 ? 0 : random() % (most + 1); left > 0; --left) {
       place += 1 + static_cast<std::int64_t>(random()) % (random() % 3 == 0 ? 40 : 3);
       if (place > vertices) break;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "isohf/light/shadow_sweep.h"
 #include "light/shadow_world.h"
 
 namespace isohf {
@@ -12,29 +13,58 @@ namespace {
 using Terrain = ShadowWorld::Terrain;
 
 /// What enters each tile of a row, carried from tile to tile.
-std::vector<CasterRows> carry(const ShadowWorld& world, LightTravel travel, double fall_min, double lowest = 0.0) {
+std::vector<CasterRows> carry(const ShadowWorld& world, LightTravel travel, double fall_min) {
   const TileShape& shape = world.shape();
   std::vector<CasterRows> entering(static_cast<std::size_t>(world.grid.tile_columns()));
   CasterRows handed = no_casters(shape);
   for (std::int64_t i = 0; i < world.grid.tile_columns(); ++i) {
     const std::int64_t tile = travel == LightTravel::kEastward ? i : world.grid.tile_columns() - 1 - i;
     const std::vector<std::uint16_t> codes = world.tile_codes(tile);
-    entering[static_cast<std::size_t>(tile)] = handed;
+    entering[static_cast<std::size_t>(tile)] = beyond_padding(handed);
     const View2D<const std::uint16_t> view(codes.data(), shape.columns(), shape.rows());
     const TileCasters own = tile_casters(shape, view, ShadowWorld::kVoid, fall_min);
-    handed = pass_on_casters(shape, handed, travel == LightTravel::kEastward ? own.eastward : own.westward, fall_min,
-                             lowest);
+    handed = pass_on_casters(shape, handed, travel == LightTravel::kEastward ? own.eastward : own.westward, fall_min);
   }
   return entering;
 }
 
-/// S at the edge where light enters a tile, from the seeds and the tile's own vertex there.
-double shadow_at_edge(const ShadowWorld& world, const CasterRows& entering, std::int64_t tile, int row,
-                      LightTravel travel, double fall) {
-  const int column = travel == LightTravel::kEastward ? 1 : last_visible_column(world.shape(), row);
-  const std::uint16_t own = world.code(tile, column, row);
-  const double seed = shadow_height_from(entering.row(row), fall);
-  return own == ShadowWorld::kVoid ? seed : std::max<double>(own, seed);
+/// What casts the shadow on the edge where light enters a tile, from its seeds and the vertex before that edge.
+ShadowCaster caster_at_edge(const ShadowWorld& world, const CasterRows& entering, std::int64_t tile, int row,
+                            LightTravel travel, double fall) {
+  std::vector<ShadowCaster> casters(entering.row(row).begin(), entering.row(row).end());
+  const bool east = travel == LightTravel::kEastward;
+  const std::int64_t before = east ? tile - 1 : tile + 1;
+  if (before >= 0 && before < world.grid.tile_columns()) {
+    const std::uint16_t code = world.code(before, east ? last_visible_column(world.shape(), row) - 1 : 2, row);
+    if (code != ShadowWorld::kVoid) casters.push_back({padding_distance(row), static_cast<double>(code)});
+  }
+  ShadowCaster highest{0, -HUGE_VAL};
+  for (const ShadowCaster& caster : casters) {
+    const auto at_edge = [fall](const ShadowCaster& c) { return c.height - static_cast<double>(c.distance) * fall; };
+    if (at_edge(caster) > at_edge(highest)) highest = caster;
+  }
+  return highest;
+}
+
+/// The same from all vertices before the edge.
+ShadowCaster caster_by_definition(const ShadowWorld& world, std::int64_t tile, int row, LightTravel travel,
+                                  double fall) {
+  const bool east = travel == LightTravel::kEastward;
+  const int across = half_steps_across(world.shape());
+  ShadowCaster highest{0, -HUGE_VAL};
+  for (std::int64_t other = tile; other >= 0 && other < world.grid.tile_columns(); other += east ? -1 : 1) {
+    for (int c = 1; c <= last_visible_column(world.shape(), row); ++c) {
+      const int x = object_x(world.shape().columns(), c, row);
+      const std::int64_t distance = std::abs(other - tile) * across - (east ? x : across - x);
+      const std::uint16_t code = world.code(other, c, row);
+      if (distance <= 0 || code == ShadowWorld::kVoid) continue;
+      const double height = code - static_cast<double>(distance) * fall;
+      if (height > highest.height - static_cast<double>(highest.distance) * fall) {
+        highest = {distance, static_cast<double>(code)};
+      }
+    }
+  }
+  return highest;
 }
 
 void expect_seeds_equal_definition(const ShadowWorld& world, double fall_min) {
@@ -42,15 +72,14 @@ void expect_seeds_equal_definition(const ShadowWorld& world, double fall_min) {
     const std::vector<CasterRows> entering = carry(world, travel, fall_min);
     for (std::int64_t tile = 0; tile < world.grid.tile_columns(); ++tile) {
       for (int row = 1; row <= visible_rows(world.shape()); ++row) {
-        const int column = travel == LightTravel::kEastward ? 1 : last_visible_column(world.shape(), row);
-        for (double fall = fall_min; fall < 1e6; fall = std::max(2.0 * fall, 0.1)) {
-          const double wanted = world.shadow(tile, column, row, travel, fall);
-          const double found = shadow_at_edge(world, entering[static_cast<std::size_t>(tile)], tile, row, travel, fall);
-          if (wanted <= 0.0) {
-            ASSERT_LE(found, 0.0);  // under the lowest elevation seeds may be dropped
-          } else {
-            ASSERT_EQ(found, wanted) << "tile " << tile << " row " << row << " fall " << fall;  // the same expression
-          }
+        for (double fall = fall_min; fall < 1e6; fall = std::max(2.03 * fall, 0.1)) {
+          const ShadowCaster wanted = caster_by_definition(world, tile, row, travel, fall);
+          const ShadowCaster found =
+              caster_at_edge(world, entering[static_cast<std::size_t>(tile)], tile, row, travel, fall);
+          // Of two that cast as high either may be listed, but where the sun is the lowest the nearer one is.
+          ASSERT_EQ(found.height - static_cast<double>(found.distance) * fall,
+                    wanted.height - static_cast<double>(wanted.distance) * fall)
+              << "tile " << tile << " row " << row << " fall " << fall;
         }
       }
     }
@@ -106,16 +135,6 @@ TEST(ShadowHull, FlatLandHandsNothingOn) {
   for (const CasterRows& rows : carry(world, LightTravel::kEastward, 0.0)) EXPECT_TRUE(rows.casters.empty());
 }
 
-TEST(ShadowHull, ShadowsThatHaveSunkUnderTheLowestElevationAreDropped) {
-  const TileShape shape = TileShape::make(5, 5, 1);
-  CasterRows entering = no_casters(shape);
-  entering.starts = {0, 2, 2, 2};
-  entering.casters = {{3, 10.0}, {7, 12.0}};
-  const CasterRows own = no_casters(shape);  // a void tile
-  EXPECT_EQ(pass_on_casters(shape, entering, own, 0.1, 11.0).casters.size(), 2U);
-  EXPECT_EQ(pass_on_casters(shape, entering, own, 0.1, 11.2).casters.size(), 0U);
-}
-
 TEST(ShadowHull, FloatsAndCodesGiveTheSameCasters) {
   const ShadowWorld world(TileShape::make(12, 11, 1), 1, 17.0, Terrain::kHoles, 5);
   const TileShape& shape = world.shape();
@@ -125,6 +144,88 @@ TEST(ShadowHull, FloatsAndCodesGiveTheSameCasters) {
   const TileCasters by_height = tile_casters(shape, View2D<const float>(heights.data(), 12, 11), 1.0);
   EXPECT_EQ(by_code.eastward, by_height.eastward);
   EXPECT_EQ(by_code.westward, by_height.westward);
+}
+
+/// Hidden parts of a row of tiles as floats' bits, swept at once or each tile by itself from its seeds.
+class SeededSweep : public testing::Test {
+ protected:
+  /// Heights with their padding, NaN where void.
+  static std::vector<float> heights(const ShadowWorld& world, std::int64_t tile, double scale) {
+    const TileShape& shape = world.shape();
+    std::vector<float> out(static_cast<std::size_t>(shape.stored_vertex_count()), NAN);
+    const auto set = [&](int row, int column, std::uint16_t code) {
+      if (code == ShadowWorld::kVoid) return;
+      out[static_cast<std::size_t>(row * shape.columns() + column)] = static_cast<float>(scale * code);
+    };
+    for (int row = 1; row <= visible_rows(shape); ++row) {
+      const int last = last_visible_column(shape, row);
+      for (int c = 1; c <= last; ++c) set(row, c, world.code(tile, c, row));
+      // Beyond all tiles it is anything.
+      set(row, 0, tile > 0 ? world.code(tile - 1, last - 1, row) : 65000);
+      set(row, last + 1, tile + 1 < world.grid.tile_columns() ? world.code(tile + 1, 2, row) : 65000);
+    }
+    return out;
+  }
+
+  /// scale: of codes to heights that need not be whole.
+  static void expect_equal(const ShadowWorld& world, double elevation_deg, double scale, std::int64_t& hidden) {
+    const TileGrid& grid = world.grid;
+    const WorldBounds ground{0.0, 0.0, grid.world_width(), grid.world_height()};
+    TileRowValues row_heights(grid, std::nullopt);
+    for (std::int64_t tile = 0; tile < grid.tile_columns(); ++tile) {
+      row_heights.write_tile(tile, heights(world, tile, scale));
+    }
+    for (const LightTravel travel : kBothTravels) {
+      const double azimuth = travel == LightTravel::kEastward ? 270.0 : 90.0;
+      const SweptSun sun = swept_sun(azimuth, elevation_deg, sun_radius_deg("Earth"), 1.0, 40.0 * scale);
+      ShadowSweep whole(grid, ground, sun);
+      TileRowValues want(grid, std::nullopt);
+      ASSERT_EQ(whole.travel(), travel);
+      (void)whole.pass(0, {}, row_heights, &want);
+      const std::vector<CasterRows> seeds = carry(world, travel, sun.lower_fall / scale * grid.sigma_x());
+      for (std::int64_t tile = 0; tile < grid.tile_columns(); ++tile) {
+        const TileGrid own = TileGrid::make(grid.shape(), 1, 1, grid.extent_x(), grid.extent_z());
+        const double x = static_cast<double>(tile) * grid.extent_x();
+        ShadowSweep sweep(own, {ground.x0 - x, ground.z0, ground.x1 - x, ground.z1}, sun);
+        sweep.begin_behind(tile, grid.tile_columns() - 1 - tile, 0);
+        const std::vector<float> read = heights(world, tile, scale);
+        CasterRows casters = seeds[static_cast<std::size_t>(tile)];
+        for (ShadowCaster& caster : casters.casters) caster.height *= scale;
+        TileRowValues tile_heights(own, std::nullopt);
+        TileRowValues found(own, std::nullopt);
+        tile_heights.write_tile(0, read);
+        (void)sweep.pass(0, sweep.entering(casters, read), tile_heights, &found);
+        const std::vector<float> got = found.tile(0);
+        const std::vector<float> wanted = want.tile(tile);
+        for (int row = 1; row <= visible_rows(grid.shape()); ++row) {
+          for (int c = 1; c <= last_visible_column(grid.shape(), row); ++c) {
+            const auto i = static_cast<std::size_t>(row * grid.shape().columns() + c);
+            ASSERT_EQ(got[i], wanted[i]) << "tile " << tile << " row " << row << " column " << c << " from " << azimuth
+                                         << " at " << elevation_deg;
+            hidden += wanted[i] > 0.0F ? 1 : 0;
+          }
+        }
+      }
+    }
+  }
+};
+
+TEST_F(SeededSweep, EqualsThatOfAllTilesBitForBit) {
+  std::int64_t hidden = 0;
+  unsigned seed = 400;
+  for (const auto& [columns, rows] : {std::pair{5, 5}, {6, 7}, {12, 11}, {21, 23}, {60, 11}}) {
+    const TileShape shape = TileShape::make(columns, rows, 1);
+    for (const Terrain terrain : kAllTerrains) {
+      for (const double elevation_deg : {0.3, 2.0, 5.0, 15.0, 45.0, 75.0}) {
+        for (const double scale : {1.0, 0.0137}) {
+          SCOPED_TRACE(testing::Message() << columns << "x" << rows << " seed " << seed);
+          const ShadowWorld world(shape, 7, 1000.0, terrain, ++seed);
+          ASSERT_NO_FATAL_FAILURE(expect_equal(world, elevation_deg, scale, hidden));
+        }
+      }
+    }
+  }
+  EXPECT_GT(hidden, 100000);
 }
 
 TEST(ShadowPath, OrdinalsAndDistancesAreInverse) {

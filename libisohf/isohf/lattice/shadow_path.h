@@ -36,6 +36,12 @@ enum class LightTravel { kEastward, kWestward };
   return 2 * shape.cell_columns();
 }
 
+/// Distance from a tile's edge of the last vertex of the row before it: what the tile stores in column 0 and behind its
+/// last visible column.
+[[nodiscard]] inline int padding_distance(int row) {
+  return row % 2 != 0 ? 2 : 1;
+}
+
 /// Distance of the n-th vertex from a tile's edge along the row, n >= 0, through as many tiles as it takes.
 [[nodiscard]] inline std::int64_t distance_from_ordinal(const TileShape& shape, int row, std::int64_t ordinal) {
   if (row % 2 != 0) return 2 * ordinal;

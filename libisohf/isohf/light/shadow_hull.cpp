@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "isohf/base/bytes.h"
-#include "isohf/light/shadow.h"
 
 namespace isohf {
 namespace {
@@ -62,10 +61,11 @@ class CasterSearch {
     row_ = row;
     first_ = rows_.casters.size();
     best_ = -HUGE_VAL;
+    // The vertex on the edge where light leaves is the next tile's.
     const int last = last_visible_column(shape_, row);
-    for (int done = 0; done < last; done += kBlock) {
-      const int width = std::min(kBlock, last - done);
-      const int begin = travel_ == LightTravel::kEastward ? last + 1 - done - width : 1 + done;
+    for (int done = 0; done < last - 1; done += kBlock) {
+      const int width = std::min(kBlock, last - 1 - done);
+      const int begin = travel_ == LightTravel::kEastward ? last - done - width : 2 + done;
       if (width == kBlock) {
         consider_block(begin);
         continue;
@@ -184,9 +184,7 @@ void ShadowHull::push(std::int64_t position, double height) {
 }
 
 void ShadowHull::casters_at(std::int64_t position, std::vector<ShadowCaster>& out) const {
-  for (std::size_t i = points_.size(); i-- > 0;) {
-    if (points_[i].position != position) out.push_back({position - points_[i].position, points_[i].height});
-  }
+  for (std::size_t i = points_.size(); i-- > 0;) out.push_back({position - points_[i].position, points_[i].height});
 }
 
 TileCasters tile_casters(const TileShape& shape, View2D<const std::uint16_t> codes, std::uint16_t void_code,
@@ -199,8 +197,7 @@ TileCasters tile_casters(const TileShape& shape, View2D<const float> heights, do
   return casters_of(shape, heights, fall_min, [](float height) { return std::abs(height) < kFar ? height : -kFar; });
 }
 
-CasterRows pass_on_casters(const TileShape& shape, const CasterRows& entering, const CasterRows& own, double fall_min,
-                           double lowest) {
+CasterRows pass_on_casters(const TileShape& shape, const CasterRows& entering, const CasterRows& own, double fall_min) {
   CasterRows out;
   out.starts.reserve(static_cast<std::size_t>(visible_rows(shape)) + 1);
   out.starts.push_back(0);
@@ -215,12 +212,18 @@ CasterRows pass_on_casters(const TileShape& shape, const CasterRows& entering, c
     for (auto caster = inside.rbegin(); caster != inside.rend(); ++caster) {
       hull.push(across - caster->distance, caster->height);
     }
-    const std::size_t first = out.casters.size();
     hull.casters_at(across, out.casters);
-    // The farthest caster is the highest at fall_min: where its shadow reaches nothing, none does.
-    if (out.casters.size() > first) {
-      const ShadowCaster& farthest = out.casters.back();
-      if (farthest.height - static_cast<double>(farthest.distance) * fall_min <= lowest) out.casters.resize(first);
+    out.starts.push_back(static_cast<std::uint32_t>(out.casters.size()));
+  }
+  return out;
+}
+
+CasterRows beyond_padding(const CasterRows& casters) {
+  CasterRows out;
+  out.starts.push_back(0);
+  for (int row = 1; row < static_cast<int>(casters.starts.size()); ++row) {
+    for (const ShadowCaster& caster : casters.row(row)) {
+      if (caster.distance > padding_distance(row)) out.casters.push_back(caster);
     }
     out.starts.push_back(static_cast<std::uint32_t>(out.casters.size()));
   }
@@ -231,14 +234,6 @@ CasterRows no_casters(const TileShape& shape) {
   CasterRows none;
   none.starts.assign(static_cast<std::size_t>(visible_rows(shape)) + 1, 0);
   return none;
-}
-
-double shadow_height_from(std::span<const ShadowCaster> casters, double fall) {
-  double height = kNoShadow;
-  for (const ShadowCaster& caster : casters) {
-    height = std::max(height, caster.height - static_cast<double>(caster.distance) * fall);
-  }
-  return height;
 }
 
 }  // namespace isohf

@@ -7,14 +7,15 @@
 #include "isohf/base/view.h"
 #include "isohf/lattice/shadow_path.h"
 
-/// Shadow seeds for every sun elevation at once. What one tile hands to the next along a row, as a function of
+/// Shadow seeds for every sun elevation at once: the state in which light enters a tile along a row. It comes to the last
+/// vertex before the tile's edge, which the tile stores as padding. What is handed to that vertex, as a function of
 /// t = tan(sun elevation), is max over all earlier vertices of (height - distance * t): an upper envelope of lines, so
 /// the upper convex hull of the points (distance, height). A few casters stand for a whole row.
 ///
 ///   height      b                 A vertex that is not higher than a later one never matters again; nor does one
 ///     |         .  `-. a          under the line between its neighbours (c). Where only suns above t_min are asked
 ///     |   c     .     | `. edge   for, what a later vertex overtops by more than distance * t_min goes as well.
-///     +---------'-----'---'----> towards the light's end
+///     +---------'-----'---'----> the vertex before the edge
 ///
 /// Heights are in codes (or elevations for float archives), falls in the same unit for one half step. With codes and
 /// distances below 2^37 half steps every comparison of the hull is exact.
@@ -30,8 +31,7 @@ class ShadowHull {
   /// The next vertex on the way; positions in half steps, ascending (the same one twice counts once). Amortised O(1).
   void push(std::int64_t position, double height);
 
-  /// The casters seen from `position` (not before the last vertex pushed), nearest first, appended to `out`; the vertex
-  /// at `position` itself is left out.
+  /// The casters seen from `position` (not before the last vertex pushed), nearest first, appended to `out`.
   void casters_at(std::int64_t position, std::vector<ShadowCaster>& out) const;
 
   void clear() { points_.clear(); }
@@ -45,8 +45,7 @@ class ShadowHull {
   std::vector<Point> points_;  ///< nearest last
 };
 
-/// The casters among a tile's own vertices, as seen from the edge where the light leaves; those on that edge (at
-/// distance 0) are listed as well.
+/// The casters among a tile's own vertices, as seen from the edge where the light leaves, without those on that edge.
 struct TileCasters {
   CasterRows eastward;
   CasterRows westward;
@@ -58,17 +57,15 @@ struct TileCasters {
                                        std::uint16_t void_code, double fall_min);
 [[nodiscard]] TileCasters tile_casters(const TileShape& shape, View2D<const float> heights, double fall_min);
 
-/// What a tile hands on: the casters that entered it (seen from the edge where they enter, at distances > 0) and its
-/// own (as tile_casters gives them), seen from the edge where the light leaves. Vertices on that edge are left out: the
-/// next tile has them too. Rows whose shadow at fall_min has sunk to `lowest`, under everything that it could fall on,
-/// hand on nothing.
+/// What a tile hands on: the casters that entered it (seen from the edge where they enter) and its own (as tile_casters
+/// gives them), seen from the edge where the light leaves.
 [[nodiscard]] CasterRows pass_on_casters(const TileShape& shape, const CasterRows& entering, const CasterRows& own,
-                                         double fall_min, double lowest);
+                                         double fall_min);
+
+/// What the next tile's seeds hold of that: not the last vertices before the edge, which it stores as padding.
+[[nodiscard]] CasterRows beyond_padding(const CasterRows& casters);
 
 /// No casters in any row: what enters the first tile.
 [[nodiscard]] CasterRows no_casters(const TileShape& shape);
-
-/// Shadow height at the edge: max of height - distance * fall, or kNoShadow without casters. O(casters).
-[[nodiscard]] double shadow_height_from(std::span<const ShadowCaster> casters, double fall);
 
 }  // namespace isohf

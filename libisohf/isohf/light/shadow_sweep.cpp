@@ -25,13 +25,19 @@ constexpr double kStepsToFullWidth = 2.0;
 /// changes by more from vertex to vertex.
 constexpr double kDeepestSteps = 4.0;
 
+/// Between two heights; not above the middle, so that it casts no farther than both whatever the rounding.
+float middle(float a, float b) {
+  const float mean = 0.5F * (a + b);
+  return mean - std::abs(mean) * 0x1p-23F;
+}
+
 /// A visible or padding row of a tile at every half step from its West edge to its East edge.
 void spread(const TileShape& shape, const float* row, bool is_odd, float* out) {
   const int cells = shape.cell_columns();
   if (is_odd) {
     for (int i = 0; i < cells; ++i) {
       out[2 * i] = row[1 + i];
-      out[2 * i + 1] = 0.5F * (row[1 + i] + row[2 + i]);
+      out[2 * i + 1] = middle(row[1 + i], row[2 + i]);
     }
     out[2 * cells] = row[1 + cells];
     return;
@@ -39,7 +45,7 @@ void spread(const TileShape& shape, const float* row, bool is_odd, float* out) {
   out[0] = row[1];
   for (int i = 0; i + 1 < cells; ++i) {
     out[2 * i + 1] = row[2 + i];
-    out[2 * i + 2] = 0.5F * (row[2 + i] + row[3 + i]);
+    out[2 * i + 2] = middle(row[2 + i], row[3 + i]);
   }
   out[2 * cells - 1] = row[1 + cells];
   out[2 * cells] = row[2 + cells];
@@ -144,6 +150,46 @@ void ShadowSweep::begin_behind(std::int64_t tiles_west, std::int64_t tiles_east,
   rows_before_ = rows_before;
 }
 
+std::optional<LightTravel> ShadowSweep::travel() const {
+  if (!by_columns_ || shift_ > 0.0) return std::nullopt;
+  return mirrored_ ? LightTravel::kWestward : LightTravel::kEastward;
+}
+
+ShadowSweep::State ShadowSweep::entering(const CasterRows& casters, std::span<const float> tile) const {
+  if (columns_before_ == 0) return {};  // padding there is beyond all tiles
+  const TileShape& shape = grid_.shape();
+  const auto lines = static_cast<std::size_t>(shape.rows()) + 1;
+  State state(2 * edges_.size() * lines, kVoidHeight);
+  for (std::size_t e = 0; e < edges_.size(); ++e) {
+    for (int row = 1; row <= visible_rows(shape); ++row) {
+      float highest = -std::numeric_limits<float>::infinity();
+      std::int64_t ran = columns_before_ * half_steps_;
+      std::int64_t place = 1;
+      const auto meet = [&](float height, std::int64_t distance) {
+        ran += place - distance;
+        place = distance;
+        const double dark = static_cast<double>(highest) - static_cast<double>(ran) * edges_[e].fall;
+        if (!(static_cast<double>(height) > dark)) return;
+        highest = height;
+        ran = 0;
+      };
+      const auto listed = casters.row(row);
+      for (auto caster = listed.rbegin(); caster != listed.rend(); ++caster) {
+        meet(static_cast<float>(caster->height), caster->distance);
+      }
+      const float* const stored = tile.data() + row * shape.columns();
+      const int last = last_visible_column(shape, row);
+      const float before = mirrored_ ? stored[last + 1] : stored[0];
+      meet(before, padding_distance(row));
+      if (padding_distance(row) > 1) meet(middle(before, mirrored_ ? stored[last] : stored[1]), 1);
+      float* const line = state.data() + 2 * e * lines + static_cast<std::size_t>(row) + 1;
+      line[0] = highest;
+      line[lines] = static_cast<float>(ran);
+    }
+  }
+  return state;
+}
+
 std::uint64_t ShadowSweep::state_bytes() const {
   const auto lanes = static_cast<double>(half_steps_ * grid_.tile_columns());
   return static_cast<std::uint64_t>(lanes * (by_columns_ ? shift_ : 1.0) * 2.0 * static_cast<double>(edges_.size()) *
@@ -228,7 +274,7 @@ ShadowSweep::State ShadowSweep::pass_along_columns(std::int64_t tile_row, const 
   const TileShape& shape = grid_.shape();
   const int lanes = shape.rows();
   ShadowFront front(lanes, shift_, edges_, range_);
-  front.resume(columns_before_ * half_steps_, front.lines());
+  front.resume(columns_before_ * half_steps_, travel() && !entering.empty() ? entering : front.lines());
   State leaving;
   std::size_t entered = 0;
   const ShadowFront::Casting columns = casting_columns();

@@ -8,6 +8,7 @@
 
 #include "isohf/base/memory/kept_rows.h"
 #include "isohf/lattice.h"
+#include "isohf/lattice/shadow_path.h"
 #include "isohf/light/shadow_front.h"
 #include "isohf/metadata.h"
 
@@ -79,14 +80,23 @@ class ShadowSweep {
   /// Whether light comes to a row of tiles from the row South of it.
   [[nodiscard]] bool from_south() const { return from_south_; }
 
+  /// The way of the light where it runs along the rows, so that nothing passes from one row of tiles to the next.
+  [[nodiscard]] std::optional<LightTravel> travel() const;
+
   /// What passes from one row of tiles to the next: what lines of light carry.
   using State = std::vector<float>;
   [[nodiscard]] std::uint64_t state_bytes() const;
   /// What a pass takes beside that.
   [[nodiscard]] double passing_bytes() const;
 
+  /// In what state light enters a tile that begins the grid, where it has a travel(). The grid's tiles alone then give
+  /// the same shadows as all tiles before them do.
+  /// casters  in the unit of heights; all ground casts, and the falls of the sun's edges are among those that they are for
+  /// tile     [C*R] heights, padding included, NaN where void
+  [[nodiscard]] State entering(const CasterRows& casters, std::span<const float> tile) const;
+
   /// Passes over a row of tiles.
-  /// entering  what the row before it left; empty: nothing, at the first row
+  /// entering  what the row before it left; empty: nothing, at the first row. Or the state that entering() gives
   /// heights   NaN where void
   /// hidden    part of the sun at visible vertices, interpolable: 0 or less it is seen, 1 or more it is not; null: not
   ///           wanted

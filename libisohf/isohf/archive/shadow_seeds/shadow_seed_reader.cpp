@@ -2,19 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/error.h"
 
 namespace isohf {
 namespace {
-
-constexpr double kNoHeight = -std::numeric_limits<double>::infinity();
-/// Sun elevations closer than this are the same.
-constexpr double kSameAngleDeg = 1e-9;
 
 ShadowSeedInfo info_of(const ArchiveReader& archive) {
   const auto info = shadow_seed_info(archive.metadata());
@@ -28,10 +20,6 @@ ShadowSeedInfo info_of(const ArchiveReader& archive) {
 }  // namespace
 
 ShadowSeedReader::ShadowSeedReader(const ArchiveReader& archive) : archive_(archive), info_(info_of(archive)) {}
-
-bool ShadowSeedReader::covers(double sun_elevation_deg) const {
-  return sun_elevation_deg > 0.0 && sun_elevation_deg < 90.0 && sun_elevation_deg >= info_.sun_min_deg - kSameAngleDeg;
-}
 
 std::vector<std::byte> ShadowSeedReader::payload(TileIndex index) const {
   if (!archive_.grid().contains(index)) {
@@ -62,28 +50,6 @@ HullSeeds ShadowSeedReader::hulls(TileIndex index, const TileCodes& tile) const 
   } catch (const Error& error) {
     throw error.within(fmt::format("{}: member \"{}\"", archive_.path(), seed_name(index)));
   }
-}
-
-std::vector<double> ShadowSeedReader::entering(TileIndex index, const TileCodes& tile, LightTravel travel,
-                                               double sun_elevation_deg) const {
-  if (!covers(sun_elevation_deg)) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: has shadow seeds for {} degrees and more, not for a sun elevation of {} degrees",
-                            archive_.path(), info_.sun_min_deg, sun_elevation_deg));
-  }
-  const TileGrid& grid = archive_.grid();
-  const Quantisation& quantisation = archive_.metadata().quantisation;
-  const auto rows = static_cast<std::size_t>(visible_rows(grid.shape()));
-  std::vector<double> heights(rows, kNoHeight);
-  const double fall = info_.fall_per_half_step(grid, quantisation, sun_elevation_deg);
-  const HullSeeds seeds = hulls(index, tile);
-  const CasterRows& casters = travel == LightTravel::kEastward ? seeds.eastward : seeds.westward;
-  for (std::size_t row = 0; row < rows; ++row) {
-    for (const ShadowCaster& caster : casters.row(static_cast<int>(row) + 1))
-      heights[row] = std::max(heights[row], caster.height - static_cast<double>(caster.distance) * fall);
-  }
-  for (double& height : heights) height = quantisation.offset + quantisation.scale * height;
-  return heights;
 }
 
 }  // namespace isohf

@@ -17,17 +17,8 @@ class ShadowSeedReader {
 
   [[nodiscard]] const ShadowSeedInfo& info() const { return info_; }
 
-  /// True where the seeds hold for that sun elevation.
-  [[nodiscard]] bool covers(double sun_elevation_deg) const;
-
-  /// Shadow height at the edge where light enters, for stored rows 1 to R-2, in elevation units; minus infinity where
-  /// nothing casts a shadow that is higher than the tile's own vertex there. This is what tile_shadow takes as
-  /// `entering`. `tile` is the tile as read_tile gives it. Throws Error{kInvalidArgument} where covers() is false,
-  /// kCorrupt.
-  [[nodiscard]] std::vector<double> entering(TileIndex index, const TileCodes& tile, LightTravel travel,
-                                             double sun_elevation_deg) const;
-
-  /// The hulls themselves, none where the tile has no member.
+  /// The casters of a tile, none where it has no member. `tile` is the tile as read_tile gives it. Throws
+  /// Error{kCorrupt}.
   [[nodiscard]] HullSeeds hulls(TileIndex index, const TileCodes& tile) const;
 
  private:

@@ -160,7 +160,7 @@ double height_from_whole(CodeType type, std::int32_t whole) {
   return whole;
 }
 
-/// What heights at a row's edge are coded on: the tile's own vertex there; where it is void what is below all others.
+/// What a row's heights are coded on: the padding at that edge; where it is void what is below all others.
 std::int32_t edge_of(const TileEdges& edges, int row, LightTravel travel) {
   const double height = (travel == LightTravel::kEastward ? edges.west : edges.east)[static_cast<std::size_t>(row - 1)];
   if (!std::isnan(height)) return whole_from_height(edges.type, height);
@@ -224,7 +224,7 @@ class CasterPrediction {
   int row_;
   std::span<const ShadowCaster> above_;
   std::size_t next_ = 0;
-  std::int64_t place_ = 0;
+  std::int64_t place_ = 1;  ///< the padding's
   std::int32_t whole_;
 };
 
@@ -335,7 +335,7 @@ TileEdges tile_edges(const TileShape& shape, const TileCodes& tile) {
   edges.type = tile.type;
   const auto void_code = tile.type == CodeType::kU8 ? 255 : 65535;
   for (int row = 1; row <= visible_rows(shape); ++row) {
-    for (const int column : {1, last_visible_column(shape, row)}) {
+    for (const int column : {0, last_visible_column(shape, row) + 1}) {
       const auto at =
           static_cast<std::size_t>(row) * static_cast<std::size_t>(shape.columns()) + static_cast<std::size_t>(column);
       double height = NAN;
@@ -344,7 +344,7 @@ TileEdges tile_edges(const TileShape& shape, const TileCodes& tile) {
       } else if (tile.codes[at] != void_code) {
         height = tile.codes[at];
       }
-      (column == 1 ? edges.west : edges.east).push_back(height);
+      (column == 0 ? edges.west : edges.east).push_back(height);
     }
   }
   return edges;

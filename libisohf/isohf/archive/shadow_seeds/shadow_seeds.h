@@ -47,15 +47,15 @@ void shadow_seed_members(JsonMembers& json, ShadowSeedInfo& info);
 /// The tile of such a name; nullopt where it is none in exactly that form.
 [[nodiscard]] std::optional<TileIndex> tile_from_seed_name(std::string_view name);
 
-/// The casters that act on one tile, at the edge where their shadows enter: West for light that travels eastwards.
-/// Distances > 0; a vertex on the edge itself is the tile's own.
+/// The casters that act on one tile, seen from the edge where their shadows enter: West for light that travels eastwards.
+/// They lie beyond the last vertex before that edge, which the tile stores as padding.
 struct HullSeeds {
   CasterRows eastward;
   CasterRows westward;
   [[nodiscard]] bool empty() const { return eastward.casters.empty() && westward.casters.empty(); }
 };
 
-/// A tile's own vertices on its West and East edge, in visible rows: what heights are coded on.
+/// The padding West and East of a tile's visible rows: what heights are coded on.
 struct TileEdges {
   CodeType type = CodeType::kU16;
   std::vector<double> west;  ///< [R-2] codes (kF32: elevations), NaN where void

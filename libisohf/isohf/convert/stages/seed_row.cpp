@@ -4,7 +4,6 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "isohf/archive/writer.h"
@@ -59,8 +58,6 @@ CasterRows read_casters(const SpillBuffer& bytes, std::uint64_t at) {
 SeedRow::SeedRow(const TileGrid& grid, const Quantisation& quantisation, const ShadowSeedInfo& info)
     : grid_(grid), quantisation_(quantisation) {
   fall_min_ = info.fall_per_half_step(grid, quantisation, info.sun_min_deg);
-  // No code is below 0; how low floats go is only known at the end.
-  lowest_ = quantisation.type == CodeType::kF32 ? -std::numeric_limits<double>::infinity() : 0.0;
 }
 
 SeedRow::Tile SeedRow::prepare(const TileCodes& codes) const {
@@ -105,7 +102,7 @@ void SeedRow::encode(const Tiles& tiles, const Take& take) const {
   CasterRows handed = no_casters(shape);
   for (std::size_t i = count; i-- > 0;) {
     entering[i] = append(westward, handed);
-    handed = pass_on_casters(shape, handed, read_casters(tiles.bytes_, tiles.places_[i].westward), fall_min_, lowest_);
+    handed = pass_on_casters(shape, handed, read_casters(tiles.bytes_, tiles.places_[i].westward), fall_min_);
   }
   handed = no_casters(shape);
   for (std::size_t first = 0; first < count; first += kTilesAtOnce) {
@@ -114,9 +111,9 @@ void SeedRow::encode(const Tiles& tiles, const Take& take) const {
     std::vector<TileEdges> edges(end - first);
     for (std::size_t i = first; i < end; ++i) {
       const Tiles::Place& place = tiles.places_[i];
-      seeds[i - first].westward = read_casters(westward, entering[i]);
-      CasterRows next = pass_on_casters(shape, handed, read_casters(tiles.bytes_, place.eastward), fall_min_, lowest_);
-      seeds[i - first].eastward = std::exchange(handed, std::move(next));
+      seeds[i - first].westward = beyond_padding(read_casters(westward, entering[i]));
+      CasterRows next = pass_on_casters(shape, handed, read_casters(tiles.bytes_, place.eastward), fall_min_);
+      seeds[i - first].eastward = beyond_padding(std::exchange(handed, std::move(next)));
       std::uint64_t at = place.edges;
       edges[i - first].type = place.type;
       edges[i - first].west = read<double>(tiles.bytes_, at);

@@ -66,7 +66,6 @@ class SeedRow {
   TileGrid grid_;
   Quantisation quantisation_;
   double fall_min_;
-  double lowest_;
 };
 
 }  // namespace isohf
