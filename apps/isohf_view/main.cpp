@@ -67,9 +67,10 @@ std::string text_from(const ViewReport& report, const std::string& archive) {
     text += "shadows: not looked at, as tiles are at fault\n";
   } else {
     text += fmt::format(
-        "shadows: suns of {:g} degrees, East and West, {} vertices, worst {:.4f} codes, share of the sun {:.2e}\n",
-        fmt::join(report.suns_deg, ", "), cli::describe_count(report.shadow_vertices), report.worst_shadow,
-        report.worst_share);
+        "shadows: suns of {:g} degrees, East and West, {} vertices, {} of them from seeds, worst {:.2e} of the sun, "
+        "pixels {:.2e}\n",
+        fmt::join(report.suns_deg, ", "), cli::describe_count(report.shadow_vertices),
+        cli::describe_count(report.seeded_vertices), report.worst_shadow, report.worst_share);
   }
   if (report.passed()) return text + archive + ": archive, index arrays and shaders agree\n";
   for (const ViewFinding& found : report.findings) {
@@ -105,7 +106,8 @@ ordered_json json_from(const ViewReport& report, const std::string& archive) {
           {"worst_normal", report.worst_normal},
           {"suns_deg", report.suns_deg},
           {"shadow_vertices", report.shadow_vertices},
-          {"worst_shadow_codes", report.worst_shadow},
+          {"seeded_vertices", report.seeded_vertices},
+          {"worst_shadow", report.worst_shadow},
           {"worst_share_of_sun", report.worst_share},
           {"failures", report.failures},
           {"findings", findings}};

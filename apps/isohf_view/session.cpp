@@ -74,7 +74,7 @@ std::optional<CastingSun> casting_sun(double azimuth_deg, double elevation_deg, 
   if (elevation_deg <= 0.0 || elevation_deg >= 90.0) return std::nullopt;
   const double over_true_deg = std::atan(std::tan(elevation_deg * kDegree) / exaggeration) / kDegree;
   if (std::max(elevation_deg, over_true_deg) > kOverhead_deg) return std::nullopt;
-  return CastingSun{azimuth_deg, elevation_deg, std::nullopt, exaggeration};
+  return CastingSun{azimuth_deg, elevation_deg, exaggeration};
 }
 
 Session::Session(const TileSource& source, const Options& options)

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -72,14 +73,28 @@ TEST_F(TexturedArchiveTest, ShowsTexturesUnlessAskedForOtherColours) {
   EXPECT_NE(refused.err.find("convert with --texture"), std::string::npos);
 }
 
-TEST_F(ConvertedArchiveTest, ShadowsNeedNoSeeds) {
-  convert({"--shadow-seeds"});
-  const std::string seeded = picture({"--sun", "200,6"});
-  convert({});
-  EXPECT_EQ(picture({"--sun", "200,6"}), seeded);
-  const RunResult verified = view({"--verify"});
-  EXPECT_EQ(verified.exit_code, 0) << verified.out;
-  EXPECT_NE(verified.out.find("\nshadows: suns of 3, 7, 15, 35 degrees"), std::string::npos);
+/// Mountains over many tiles, under suns due East and West of any height that the seeds serve and some that they do not.
+TEST_F(ConvertedArchiveTest, PicturesFromSeedsAreThoseOfTheSweep) {
+  const std::vector<std::string> options{"--density", "1", "--shape", "36x43"};
+  convert(options, "peaks_256x256_uint16.png");
+  std::vector<std::string> swept;
+  const std::vector<std::string> suns{"90,1.5", "90,4", "270,4", "90,12", "270,12", "270,40", "200,6"};
+  for (const std::string& sun : suns) swept.push_back(picture({"--sun", sun}));
+  convert(with_more(options, {"--shadow-seeds"}), "peaks_256x256_uint16.png");
+  for (std::size_t i = 0; i < suns.size(); ++i) EXPECT_EQ(picture({"--sun", suns[i]}), swept[i]) << suns[i];
+}
+
+TEST_F(ConvertedArchiveTest, SeedsGiveEachVertexWhatTheSweepOverWholeRowsGives) {
+  for (const std::vector<std::string>& options : std::vector<std::vector<std::string>>{
+           {"--shadow-seeds"}, {"--shadow-seeds", "--type", "u8"}, {"--shadow-seeds", "--type", "f32"}, {}}) {
+    convert(with_more({"--density", "1", "--shape", "100x115"}, options), "peaks_256x256_uint16.png");
+    const RunResult verified = view({"--verify", "--json"});
+    EXPECT_EQ(verified.exit_code, 0) << verified.out;
+    const auto report = nlohmann::json::parse(verified.out);
+    EXPECT_GT(report.at("shadow_vertices"), 500000);
+    EXPECT_EQ(report.at("seeded_vertices"), options.empty() ? 0 : report.at("shadow_vertices").get<int>());
+    EXPECT_EQ(report.at("worst_shadow"), 0.0);
+  }
 }
 
 /// Real files, converted with shadow seeds.

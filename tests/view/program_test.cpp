@@ -114,7 +114,7 @@ TEST_F(ViewProgramTest, VerifiesGoodAndBadArchives) {
 
   const Outcome part = run(path("bad.isohf") + " --verify --tiles 2:3,0:1 --json");
   EXPECT_EQ(nlohmann::json::parse(part.out).at("tiles"), 1) << part.out;
-  EXPECT_EQ(run(path("bad.isohf") + " --verify --tiles 1:2,1:2").exit_code, 3);
+  EXPECT_EQ(run(path("bad.isohf") + " --verify --tiles 1:3,1:2").exit_code, 3);
 }
 
 TEST_F(ViewProgramTest, DrawsArchivesThatAreVoidOrOneTile) {

@@ -68,7 +68,7 @@ TEST(CastShadows, AgreeWithRaysForSunsThatStandAnywhere) {
   std::vector<TileIndex> all;
   for (std::int64_t tile = 0; tile < source.grid().tile_count(); ++tile) all.push_back(source.grid().tile_at(tile));
   for (int azimuth = 0; azimuth < 360; azimuth += 24) {
-    const CastingSun sun{azimuth + 3.0, azimuth % 72 == 0 ? 4.0 : 13.0, 0.05};
+    const CastingSun sun{azimuth + 3.0, azimuth % 72 == 0 ? 4.0 : 13.0};
     int wrong = 0;
     int compared = 0;
     int dark = 0;
@@ -106,7 +106,7 @@ TEST(CastShadows, AreThoseOfAllTilesTogether) {
   std::vector<TileIndex> all;
   for (std::int64_t tile = 0; tile < source.grid().tile_count(); ++tile) all.push_back(source.grid().tile_at(tile));
   for (int azimuth = 0; azimuth < 360; azimuth += 15) {
-    const CastingSun sun{azimuth + 1.0, 11.0, 5.0};
+    const CastingSun sun{azimuth + 1.0, 11.0};
     for (const TileShadow& whole : cast(source, sun, all)) {
       const TileShadow own = std::move(cast(source, sun, {whole.tile}).front());
       EXPECT_EQ(own.gain, whole.gain);
@@ -128,12 +128,12 @@ TEST(CastShadows, ReadNoMoreThanMayCast) {
   const TileRange one{2, 2, 2, 2};
   const CastingLimits limits;
   // From high above only what is near.
-  EXPECT_EQ(casting_range(source, {315.0, 89.0, 1.0}, one, limits), (TileRange{1, 3, 1, 2}));
-  EXPECT_EQ(casting_range(source, {90.0, 89.0, 1.0}, one, limits), (TileRange{2, 3, 2, 2}));
-  EXPECT_EQ(casting_range(source, {180.0, 0.1, 1.0}, one, limits), (TileRange{2, 2, 2, 3}));
-  EXPECT_EQ(casting_range(source, {225.0, 0.1, 1.0}, one, limits), (TileRange{0, 3, 2, 3}));
-  EXPECT_EQ(casting_range(source, {270.0, 0.1, 1.0}, one, {2, 100}), (TileRange{1, 2, 2, 2}));
-  EXPECT_EQ(casting_range(source, {270.0, 0.1, 1.0}, one, {100, 2}), (TileRange{1, 2, 2, 2}));
+  EXPECT_EQ(casting_range(source, {315.0, 89.0}, one, limits), (TileRange{1, 3, 1, 2}));
+  EXPECT_EQ(casting_range(source, {90.0, 89.0}, one, limits), (TileRange{2, 3, 2, 2}));
+  EXPECT_EQ(casting_range(source, {180.0, 0.1}, one, limits), (TileRange{2, 2, 2, 3}));
+  EXPECT_EQ(casting_range(source, {225.0, 0.1}, one, limits), (TileRange{0, 3, 2, 3}));
+  EXPECT_EQ(casting_range(source, {270.0, 0.1}, one, {2, 100}), (TileRange{1, 2, 2, 2}));
+  EXPECT_EQ(casting_range(source, {270.0, 0.1}, one, {100, 2}), (TileRange{1, 2, 2, 2}));
 }
 
 TEST(CastShadows, SayWhatCouldNotBeRead) {
@@ -142,7 +142,7 @@ TEST(CastShadows, SayWhatCouldNotBeRead) {
     if (tile == TileIndex{1, 2}) throw Error(ErrorCode::kCorrupt, "tile (1,2)");
   });
   std::string unread;
-  EXPECT_EQ(cast(source, {270.0, 2.0, 1.0}, {{2, 2}}, &unread).size(), 1U);
+  EXPECT_EQ(cast(source, {270.0, 2.0}, {{2, 2}}, &unread).size(), 1U);
   EXPECT_EQ(unread, "tile (1,2)");
 }
 
@@ -152,10 +152,9 @@ TEST(CastShadows, AreThoseOfTheHeightsThatAreDrawn) {
   const double over_true_deg = std::atan(std::tan(20.0 * kDegree) / 3.0) / kDegree;
   auto drawn = casting_sun(123.0, 20.0, 3.0);
   ASSERT_TRUE(drawn);
-  drawn->softness = 2.0;
   const TileShadow shadow = cast(source, *drawn, {{2, 2}}).front();
-  EXPECT_EQ(shadow.depths, cast(source, {123.0, over_true_deg, 2.0}, {{2, 2}}).front().depths);
-  EXPECT_NE(shadow.depths, cast(source, {123.0, 20.0, 2.0}, {{2, 2}}).front().depths);
+  EXPECT_EQ(shadow.depths, cast(source, {123.0, over_true_deg}, {{2, 2}}).front().depths);
+  EXPECT_NE(shadow.depths, cast(source, {123.0, 20.0}, {{2, 2}}).front().depths);
 }
 
 TEST(CastingSun, CastsNothingAtNightOrOverhead) {

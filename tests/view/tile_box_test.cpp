@@ -149,7 +149,7 @@ TEST_F(TileBoxTest, ShadesAllTilesAnewWhenTheSunMoves) {
   const MemoryTiles source(wide_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   TileBox box(source, shared, limits_for(400, 4));
-  for (const CastingSun& sun : {CastingSun{270.0, 2.0, 2.0}, CastingSun{131.0, 6.0, 2.0}}) {
+  for (const CastingSun& sun : {CastingSun{270.0, 2.0}, CastingSun{131.0, 6.0}}) {
     box.set_sun(sun);
     box.finish({700.0, 900.0}, 300.0);
     EXPECT_EQ(box.figures().shadows_to_come, 0);
@@ -182,7 +182,7 @@ TEST_F(TileBoxTest, KeepsOldShadowsUntilNewOnesAreThere) {
   box.finish({700.0, 900.0}, 300.0);
   closed = true;
   for (int frame = 0; frame < 5; ++frame) {
-    box.set_sun(CastingSun{250.0, 3.0 + frame, 2.0});
+    box.set_sun(CastingSun{250.0, 3.0 + frame});
     box.update({700.0, 900.0}, 300.0);
     EXPECT_EQ(box.figures().shadows_to_come, box.figures().resident_tiles);
   }

@@ -29,9 +29,7 @@ SweptSun swept(const TileSource& source, const CastingSun& sun) {
   const Metadata* const metadata = source.metadata();
   const double radius = sun_radius_deg(metadata != nullptr ? metadata->source.body : std::string());
   const double scale = source.scale().scale;
-  SweptSun swept = swept_sun(sun.azimuth_deg, sun.elevation_deg, radius, sun.exaggeration, 1.0 / scale);
-  if (sun.softness) swept.softness = *sun.softness / scale;
-  return swept;
+  return swept_sun(sun.azimuth_deg, sun.elevation_deg, radius, sun.exaggeration, 1.0 / scale);
 }
 
 /// Lowest elevation of the stored tiles of a range; infinite where there are none.
@@ -77,56 +75,105 @@ TileRange casting_range(const TileSource& source, const CastingSun& sun, const T
   }
 }
 
+namespace {
+
+/// A pass of light over a range of tiles.
+class RangeSweep {
+ public:
+  RangeSweep(const TileSource& source, const SweptSun& sun, const TileRange& range)
+      : source_(source),
+        range_(range),
+        box_(TileGrid::make(source.grid().shape(), columns(), rows(), source.grid().extent_x(),
+                            source.grid().extent_z())),
+        sweep_(box_, covered(), sun),
+        heights_(box_, std::nullopt),
+        hidden_(box_, std::nullopt) {
+    const TileGrid& grid = source.grid();
+    // Lines of light lie where a sweep over all tiles would have them, so that shadows go on from one range to the next.
+    sweep_.begin_behind(range.first_column, grid.tile_columns() - 1 - range.last_column,
+                        sweep_.from_south() ? grid.tile_rows() - 1 - range.last_row : range.first_row);
+  }
+
+  /// Appends the shadows of those of the tiles that lie in the range.
+  void cast(const std::vector<TileIndex>& tiles, bool from_seeds, const std::atomic<bool>& cancelled,
+            std::string& unread, std::vector<TileShadow>& shadows);
+
+ private:
+  [[nodiscard]] std::int64_t columns() const { return range_.last_column - range_.first_column + 1; }
+  [[nodiscard]] std::int64_t rows() const { return range_.last_row - range_.first_row + 1; }
+  [[nodiscard]] WorldBounds covered() const {
+    const WorldBounds all = source_.covered();
+    const double x = static_cast<double>(range_.first_column) * box_.extent_x();
+    const double z = static_cast<double>(range_.first_row) * box_.extent_z();
+    return {all.x0 - x, all.z0 - z, all.x1 - x, all.z1 - z};
+  }
+
+  const TileSource& source_;
+  TileRange range_;
+  TileGrid box_;
+  ShadowSweep sweep_;
+  TileRowValues heights_;
+  TileRowValues hidden_;
+};
+
+void RangeSweep::cast(const std::vector<TileIndex>& tiles, bool from_seeds, const std::atomic<bool>& cancelled,
+                      std::string& unread, std::vector<TileShadow>& shadows) {
+  const auto vertices = static_cast<std::size_t>(box_.shape().stored_vertex_count());
+  const auto gain = static_cast<float>(0.5 + sweep_.range());
+  std::vector<float> read(vertices);
+  ShadowSweep::State light;
+  for (std::int64_t k = 0; k < rows() && !cancelled; ++k) {
+    const std::int64_t row = sweep_.from_south() ? rows() - 1 - k : k;
+    for (std::int64_t column = 0; column < columns(); ++column) {
+      const TileIndex at{range_.first_column + column, range_.first_row + row};
+      std::fill(read.begin(), read.end(), std::numeric_limits<float>::quiet_NaN());
+      try {
+        if (from_seeds) {
+          light = sweep_.entering(source_.read_casters(at, *sweep_.travel(), read), read);
+        } else if (source_.bounds(at).stored) {
+          source_.read_heights(at, read);
+        }
+      } catch (const Error& error) {
+        if (unread.empty()) unread = error.what();
+      }
+      heights_.write_tile(column, read);
+    }
+    const auto lies_here = [&](TileIndex tile) { return tile.row == range_.first_row + row && range_.contains(tile); };
+    const bool wanted = std::any_of(tiles.begin(), tiles.end(), lies_here);
+    light = sweep_.pass(row, light, heights_, wanted ? &hidden_ : nullptr);
+    for (const TileIndex shaded : tiles) {
+      if (!lies_here(shaded)) continue;
+      const std::vector<float> found = hidden_.tile(shaded.column - range_.first_column);
+      TileShadow shadow{shaded, std::vector<std::int16_t>(vertices), gain};
+      std::transform(found.begin(), found.end(), shadow.depths.begin(), [gain](float part) {
+        return static_cast<std::int16_t>(std::lround(std::clamp(part * kDepthSteps / gain, -kDepthSteps, kDepthSteps)));
+      });
+      shadows.push_back(std::move(shadow));
+    }
+  }
+}
+
+}  // namespace
+
+bool uses_seeds(const TileSource& source, const CastingSun& sun) {
+  const bool is_along_rows = std::abs(std::cos(sun.azimuth_deg * kDegree)) < 1e-9;
+  return is_along_rows && source.has_seeds(swept(source, sun).lower_fall * source.grid().sigma_x());
+}
+
 std::vector<TileShadow> cast_shadows(const TileSource& source, const CastingSun& sun,
                                      const std::vector<TileIndex>& tiles, const CastingLimits& limits,
                                      const std::atomic<bool>& cancelled, std::string& unread) {
   std::vector<TileShadow> shadows;
   if (tiles.empty()) return shadows;
-  const TileGrid& grid = source.grid();
-  const TileRange range = casting_range(source, sun, range_of(tiles), limits);
-  const std::int64_t columns = range.last_column - range.first_column + 1;
-  const std::int64_t rows = range.last_row - range.first_row + 1;
-  const WorldPoint corner{static_cast<double>(range.first_column) * grid.extent_x(),
-                          static_cast<double>(range.first_row) * grid.extent_z()};
-  const WorldBounds covered = limits.ground.value_or(source.covered());
-  const TileGrid box = TileGrid::make(grid.shape(), columns, rows, grid.extent_x(), grid.extent_z());
-  ShadowSweep sweep(box, {covered.x0 - corner.x, covered.z0 - corner.z, covered.x1 - corner.x, covered.z1 - corner.z},
-                    swept(source, sun));
-  // Lines of light lie where a sweep over all tiles would have them, so that shadows go on from one range to the next.
-  sweep.begin_behind(range.first_column, grid.tile_columns() - 1 - range.last_column,
-                     sweep.from_south() ? grid.tile_rows() - 1 - range.last_row : range.first_row);
-  const auto vertices = static_cast<std::size_t>(grid.shape().stored_vertex_count());
-  const auto steps = static_cast<float>(kDepthSteps / (0.5 + sweep.range()));
-  TileRowValues heights(box, std::nullopt);
-  TileRowValues hidden(box, std::nullopt);
-  std::vector<float> read(vertices);
-  ShadowSweep::State light;
-  for (std::int64_t k = 0; k < rows && !cancelled; ++k) {
-    const std::int64_t row = sweep.from_south() ? rows - 1 - k : k;
-    for (std::int64_t column = 0; column < columns; ++column) {
-      const TileIndex at{range.first_column + column, range.first_row + row};
-      std::fill(read.begin(), read.end(), std::numeric_limits<float>::quiet_NaN());
-      try {
-        if (source.bounds(at).stored) source.read_heights(at, read);
-      } catch (const Error& error) {
-        if (unread.empty()) unread = error.what();
-      }
-      heights.write_tile(column, read);
+  const SweptSun light = swept(source, sun);
+  if (limits.uses_seeds && uses_seeds(source, sun)) {
+    for (const TileIndex tile : tiles) {
+      RangeSweep(source, light, range_of({tile})).cast({tile}, true, cancelled, unread, shadows);
     }
-    const bool wanted =
-        std::any_of(tiles.begin(), tiles.end(), [&](TileIndex tile) { return tile.row == range.first_row + row; });
-    light = sweep.pass(row, light, heights, wanted ? &hidden : nullptr);
-    if (!wanted) continue;
-    for (const TileIndex shaded : tiles) {
-      if (shaded.row != range.first_row + row) continue;
-      const std::vector<float> found = hidden.tile(shaded.column - range.first_column);
-      TileShadow shadow{shaded, std::vector<std::int16_t>(vertices), static_cast<float>(0.5 + sweep.range())};
-      std::transform(found.begin(), found.end(), shadow.depths.begin(), [steps](float part) {
-        return static_cast<std::int16_t>(std::lround(std::clamp(part * steps, -kDepthSteps, kDepthSteps)));
-      });
-      shadows.push_back(std::move(shadow));
-    }
+    return shadows;
   }
+  RangeSweep(source, light, casting_range(source, sun, range_of(tiles), limits))
+      .cast(tiles, false, cancelled, unread, shadows);
   return shadows;
 }
 

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "isohf/archive.h"
+#include "isohf/archive/shadow_seeds/shadow_seed_reader.h"
 #include "isohf/archive/textures/texture_reader.h"
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
@@ -38,6 +39,9 @@ std::optional<WorldGeoreference> understood_places(const ArchiveReader& archive)
   }
 }
 
+/// Falls and places that are as near are the same.
+constexpr double kSameFall = 1e-9;
+
 class ArchiveSource final : public TileSource {
  public:
   ArchiveSource(const std::string& path, const std::string& name)
@@ -59,6 +63,8 @@ class ArchiveSource final : public TileSource {
       scale_ = {whole.low, whole.high > whole.low ? (whole.high - whole.low) / (kVoidCode - 1) : 1.0};
     }
     if (texture_info(metadata)) textures_.emplace(reader_);
+    // Seeds know nothing of where the source ends, beyond which no ground casts shadows.
+    if (shadow_seed_info(metadata) && is_covered()) seeds_.emplace(reader_);
   }
 
   [[nodiscard]] const TileGrid& grid() const override { return grid_; }
@@ -78,6 +84,23 @@ class ArchiveSource final : public TileSource {
   void read(TileIndex tile, std::span<std::uint16_t> codes) const override { convert(reader_.read_tile(tile), codes); }
   void read_heights(TileIndex tile, std::span<float> heights) const override {
     exact_codes(reader_.read_tile(tile), heights);
+  }
+  [[nodiscard]] bool has_seeds(double fall) const override {
+    if (!seeds_) return false;
+    const ShadowSeedInfo& info = seeds_->info();
+    const double least =
+        info.fall_per_half_step(reader_.grid(), reader_.metadata().quantisation, info.sun_min_deg) * code_per_stored();
+    return fall >= least * (1.0 - kSameFall);
+  }
+  CasterRows read_casters(TileIndex tile, LightTravel travel, std::span<float> heights) const override {
+    const TileCodes stored = reader_.read_tile(tile);
+    exact_codes(stored, heights);
+    HullSeeds seeds = seeds_->hulls(tile, stored);
+    CasterRows casters = std::move(travel == LightTravel::kEastward ? seeds.eastward : seeds.westward);
+    for (ShadowCaster& caster : casters.casters) {
+      if (is_float()) caster.height = exact_code_of(caster.height);
+    }
+    return casters;
   }
 
  private:
@@ -138,6 +161,16 @@ class ArchiveSource final : public TileSource {
             scale_.offset + scale_.scale * entry.code_max};
   }
 
+  /// Whether the source covers the whole world, to a hair of a lattice step.
+  [[nodiscard]] bool is_covered() const {
+    const WorldBounds all = covered();
+    const double hair = kSameFall * grid_.sigma_x();
+    return all.x0 <= hair && all.z0 <= hair && all.x1 >= grid_.world_width() - hair &&
+           all.z1 >= grid_.world_height() - hair;
+  }
+  /// Codes here for one that is stored, or for a unit of elevations where these are.
+  [[nodiscard]] double code_per_stored() const { return is_float() ? world_per_elevation_ / scale_.scale : 1.0; }
+
   [[nodiscard]] bool is_float() const { return reader_.metadata().quantisation.type == CodeType::kF32; }
   [[nodiscard]] static std::uint16_t rounded(double code) {
     return static_cast<std::uint16_t>(std::clamp(std::round(code), 0.0, kVoidCode - 1.0));
@@ -180,6 +213,7 @@ class ArchiveSource final : public TileSource {
   mutable std::once_flag georeference_once_;
   mutable std::optional<WorldGeoreference> georeference_;
   std::optional<TextureReader> textures_;
+  std::optional<ShadowSeedReader> seeds_;
   std::optional<Planes> planes_;
   std::vector<std::unique_ptr<Coarse>> coarse_;
 };
@@ -192,6 +226,10 @@ void TileSource::read_heights(TileIndex tile, std::span<float> heights) const {
   std::transform(codes.begin(), codes.end(), heights.begin(), [](std::uint16_t code) {
     return code == kVoidCode ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(code);
   });
+}
+
+CasterRows TileSource::read_casters(TileIndex, LightTravel, std::span<float>) const {
+  throw Error(ErrorCode::kUnsupported, "this source has no shadow seeds");
 }
 
 Place TileSource::describe(WorldPoint at, double height) const {

@@ -13,6 +13,7 @@
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/lattice.h"
 #include "isohf/lattice/planes.h"
+#include "isohf/lattice/shadow_path.h"
 #include "isohf/metadata.h"
 #include "isohf/picture.h"
 #include "isohf/restore/ground_scale.h"
@@ -73,6 +74,10 @@ class TileSource {
   [[nodiscard]] virtual const TileSource& plane(int) const { return *this; }
   /// A tile's heights in codes, not rounded, NaN where void: what shadows are computed from. [C x R] out.
   virtual void read_heights(TileIndex tile, std::span<float> heights) const;
+  /// Whether shadow seeds serve light along the rows that falls by so many codes, and no less, in a half step.
+  [[nodiscard]] virtual bool has_seeds(double) const { return false; }
+  /// The casters of a tile's seeds, their heights like those that read_heights gives, which it gives as well.
+  virtual CasterRows read_casters(TileIndex tile, LightTravel travel, std::span<float> heights) const;
   /// From the archive's world to that of all else here.
   [[nodiscard]] virtual GroundScale ground_scale() const { return {}; }
   [[nodiscard]] WorldPoint from_archive(WorldPoint at) const;

@@ -40,10 +40,11 @@ struct ViewReport {
   std::int64_t vertices = 0;
   std::int64_t shared_vertices = 0;  ///< compared between tiles
   std::int64_t shadow_vertices = 0;
-  std::vector<double> suns_deg;  ///< that shadows were looked at for, from either side
-  double worst_shadow = 0.0;     ///< codes
-  double worst_share = 0.0;      ///< of the sun
-  double worst_height = 0.0;     ///< codes, within tolerance or not
+  std::int64_t seeded_vertices = 0;  ///< of them, drawn from shadow seeds
+  std::vector<double> suns_deg;      ///< that shadows were looked at for, from either side
+  double worst_shadow = 0.0;         ///< part of the sun that is hidden
+  double worst_share = 0.0;          ///< of the sun
+  double worst_height = 0.0;         ///< codes, within tolerance or not
   double worst_normal = 0.0;
   std::int64_t failures = 0;          ///< findings in all
   std::vector<ViewFinding> findings;  ///< at most kMaxFindings, the first ones
@@ -95,9 +96,9 @@ void verify_mesh(const SharedGeometry& shared, ViewReport& report);
 /// The checks that need one tile at a time, and those between a tile and the ones before it.
 void verify_tiles(const CheckContext& context);
 
-/// Checks the shadows that pictures are drawn with: for some suns in the East and West, shadow heights are carried by the
-/// library from tile to tile along each row of tiles (paper section 3.13), and compared with what the shaders make of
-/// those that are swept.
+/// Checks the shadows that pictures are drawn with: for some suns in the East and West, light is swept over each whole
+/// row of tiles (paper section 3.13), and compared with what the shaders make of each tile's own: from the archive's seeds
+/// where it has them.
 void verify_shadows(const CheckContext& context);
 
 // Why tolerances are what they are: codes and unit normals pass through 32-bit interpolation, whose planes are told
