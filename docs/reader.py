@@ -849,6 +849,8 @@ class Archive:
 
         none, wide, seen = -1 if self.kind < 2 else -0x7F800001, 2 * (columns - 4), 0
         last = lambda r: columns - 3 if r % 2 else columns - 2
+        ends = [self.metadata["valid"][n] / self.metadata["extent"][m] * steps + 1e-6 for n, m, steps in (("x1", "x", wide), ("z1", "z", rows - 3))]
+        covers = lambda x, j, r: x <= ends[0] and j * (rows - 3) + r - 1 <= ends[1]
         for j, direction in ((j, d) for j in range(self.grid["rows"]) for d in (0, 1)):
             entering = {(k, r): -math.inf for k in range(len(suns)) for r in range(1, rows - 1)}
             order = range(self.grid["columns"])
@@ -862,10 +864,12 @@ class Archive:
                     found = shadow_seeds(self.member(name), columns, rows, self.kind, edges)
                 for (k, r), s in entering.items():
                     edge = self.height(tile, 1 if direction == 0 else last(r), r)
-                    edge = -math.inf if edge is None else number(edge)
+                    edge = -math.inf if edge is None or not covers((i + direction) * wide, j, r) else number(edge)
                     stated, padding = [edge, -math.inf], edges[direction][r]
-                    if i != order[0 if direction == 0 else -1] and padding != none:
-                        stated += [number(padding) - (2 if r % 2 else 1) * falls[k]]
+                    before = 2 if r % 2 else 1
+                    covered = covers(i * wide - before if direction == 0 else (i + 1) * wide + before, j, r)
+                    if i != order[0 if direction == 0 else -1] and padding != none and covered:
+                        stated += [number(padding) - before * falls[k]]
                     if found:
                         stated += [number(h) - d * falls[k] for d, h in found[direction, 0, r]]
                     slack = 1e-6 * max(1, abs(s) if s > -math.inf else 0)
@@ -874,7 +878,8 @@ class Archive:
                                 name + " is not what the tiles of its row send")
                     heights = (self.height(tile, c, r) for c in range(1, last(r) + 1))
                     xs = (min(max(2 * c - 2 - (r % 2 == 0), 0), wide - (r % 2 == 0 and c < last(r))) for c in range(1, last(r) + 1))
-                    left = [number(h) - (wide - x if direction == 0 else x) * falls[k] for x, h in zip(xs, heights) if h is not None]
+                    left = [number(h) - (wide - x if direction == 0 else x) * falls[k] for x, h in zip(xs, heights)
+                            if h is not None and covers(i * wide + x, j, r)]
                     entering[k, r] = max([s - wide * falls[k]] + left)
         require(seen == info["members"] == sum(name.startswith("seeds/") for name in self.members), "another number of seeds")
 

@@ -64,7 +64,17 @@ void for_each_edge(const ArchiveReader& archive, LightTravel travel, double sun_
       const TileIndex tile{travel == LightTravel::kEastward ? i : grid.tile_columns() - 1 - i, row};
       check(tile, archive.read_tile(tile), handed);
       const std::vector<double> exact = archive.read_elevations(tile);
-      const std::vector<float> heights(exact.begin(), exact.end());
+      std::vector<float> heights(exact.begin(), exact.end());
+      for (int r = 1; r <= visible_rows(shape); ++r) {
+        for (int c = 1; c <= last_visible_column(shape, r); ++c) {
+          const LatticeVertex at = grid.lattice_vertex(tile, {c, r});
+          if (static_cast<double>(at.x) * grid.sigma_x() <= archive.metadata().valid.x1 + 1e-9 &&
+              static_cast<double>(at.z) * grid.sigma_z() <= archive.metadata().valid.z1 + 1e-9) {
+            continue;
+          }
+          heights[static_cast<std::size_t>(r * shape.columns() + c)] = NAN;  // beyond what the source covers
+        }
+      }
       tile_shadow(grid, {heights.data(), shape.columns(), shape.rows()}, {travel, std::tan(sun_deg * kRadian)}, handed,
                   {}, handed);
     }
@@ -84,7 +94,13 @@ std::vector<double> shadow_at_edge(const ArchiveReader& archive, const ShadowSee
   std::vector<double> found;
   for (int row = 1; row <= visible_rows(shape); ++row) {
     const double before = (is_east ? edges.west : edges.east)[static_cast<std::size_t>(row - 1)];
-    double highest = is_first || std::isnan(before) ? kNoShadow : before - padding_distance(row) * fall;
+    const WorldBounds& valid = archive.metadata().valid;
+    const TileGrid& grid = archive.grid();
+    const std::int64_t x = is_east ? index.column * half_steps_across(shape) - padding_distance(row)
+                                   : (index.column + 1) * half_steps_across(shape) + padding_distance(row);
+    const bool is_covered = x <= last_casting_step(valid.x1, grid.sigma_x()) &&
+                            index.row * shape.cell_rows() + row - 1 <= last_casting_step(valid.z1, grid.sigma_z());
+    double highest = is_first || !is_covered || std::isnan(before) ? kNoShadow : before - padding_distance(row) * fall;
     for (const ShadowCaster& caster : (is_east ? seeds.eastward : seeds.westward).row(row)) {
       highest = std::max(highest, caster.height - static_cast<double>(caster.distance) * fall);
     }

@@ -28,6 +28,12 @@ class ConvertedArchiveTest : public GlTest {
     const RunResult result = run_isohf(command);
     ASSERT_EQ(result.exit_code, 0) << result.err;
   }
+  void convert_peaks(const std::vector<std::string>& options) const {
+    const std::string source = ISOHF_SOURCE_DIR "/testdata/peaks_256x256_uint16.png";
+    const RunResult result =
+        run_isohf(with_more({"convert", source, archive(), "--overwrite", "--quiet", "--levels", "3"}, options));
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
   [[nodiscard]] RunResult view(const std::vector<std::string>& options) const {
     std::vector<std::string> command{ISOHF_BIN_DIR "/isohf-view", archive()};
     command.insert(command.end(), options.begin(), options.end());
@@ -75,19 +81,18 @@ TEST_F(TexturedArchiveTest, ShowsTexturesUnlessAskedForOtherColours) {
 
 /// Mountains over many tiles, under suns due East and West of any height that the seeds serve and some that they do not.
 TEST_F(ConvertedArchiveTest, PicturesFromSeedsAreThoseOfTheSweep) {
-  const std::vector<std::string> options{"--density", "1", "--shape", "36x43"};
-  convert(options, "peaks_256x256_uint16.png");
+  convert_peaks({"--shape", "36x43"});
   std::vector<std::string> swept;
   const std::vector<std::string> suns{"90,1.5", "90,4", "270,4", "90,12", "270,12", "270,40", "200,6"};
   for (const std::string& sun : suns) swept.push_back(picture({"--sun", sun}));
-  convert(with_more(options, {"--shadow-seeds"}), "peaks_256x256_uint16.png");
+  convert_peaks({"--shape", "36x43", "--shadow-seeds"});
   for (std::size_t i = 0; i < suns.size(); ++i) EXPECT_EQ(picture({"--sun", suns[i]}), swept[i]) << suns[i];
 }
 
 TEST_F(ConvertedArchiveTest, SeedsGiveEachVertexWhatTheSweepOverWholeRowsGives) {
   for (const std::vector<std::string>& options : std::vector<std::vector<std::string>>{
            {"--shadow-seeds"}, {"--shadow-seeds", "--type", "u8"}, {"--shadow-seeds", "--type", "f32"}, {}}) {
-    convert(with_more({"--density", "1", "--shape", "100x115"}, options), "peaks_256x256_uint16.png");
+    convert_peaks(with_more({"--shape", "100x115"}, options));
     const RunResult verified = view({"--verify", "--json"});
     EXPECT_EQ(verified.exit_code, 0) << verified.out;
     const auto report = nlohmann::json::parse(verified.out);

@@ -169,7 +169,7 @@ TEST_F(TileBoxTest, ShadesAllTilesAnewWhenTheSunMoves) {
 }
 
 TEST_F(TileBoxTest, KeepsOldShadowsUntilNewOnesAreThere) {
-  const CastingSun old_sun{250.0, 2.0, 2.0};
+  const CastingSun old_sun{250.0, 2.0};
   std::promise<void> gate;
   const std::shared_future<void> opened = gate.get_future().share();
   std::atomic<bool> closed{false};
@@ -191,7 +191,7 @@ TEST_F(TileBoxTest, KeepsOldShadowsUntilNewOnesAreThere) {
   gate.set_value();
   EXPECT_EQ(kept, shadow_of(source, {7, 9}, old_sun));
   box.finish({700.0, 900.0}, 300.0);
-  EXPECT_EQ(shadow_on_gpu(*box.resident({7, 9})), shadow_of(source, {7, 9}, {250.0, 7.0, 2.0}));
+  EXPECT_EQ(shadow_on_gpu(*box.resident({7, 9})), shadow_of(source, {7, 9}, {250.0, 7.0}));
 }
 
 TEST_F(TileBoxTest, NamesATileThatCastsNothingAsItCannotBeRead) {

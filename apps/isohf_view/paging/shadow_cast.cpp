@@ -129,7 +129,7 @@ void RangeSweep::cast(const std::vector<TileIndex>& tiles, bool from_seeds, cons
       std::fill(read.begin(), read.end(), std::numeric_limits<float>::quiet_NaN());
       try {
         if (from_seeds) {
-          light = sweep_.entering(source_.read_casters(at, *sweep_.travel(), read), read);
+          light = sweep_.entering(row, source_.read_casters(at, *sweep_.travel(), read), read);
         } else if (source_.bounds(at).stored) {
           source_.read_heights(at, read);
         }

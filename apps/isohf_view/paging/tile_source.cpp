@@ -39,7 +39,7 @@ std::optional<WorldGeoreference> understood_places(const ArchiveReader& archive)
   }
 }
 
-/// Falls and places that are as near are the same.
+/// Falls that are as near are the same.
 constexpr double kSameFall = 1e-9;
 
 class ArchiveSource final : public TileSource {
@@ -63,8 +63,7 @@ class ArchiveSource final : public TileSource {
       scale_ = {whole.low, whole.high > whole.low ? (whole.high - whole.low) / (kVoidCode - 1) : 1.0};
     }
     if (texture_info(metadata)) textures_.emplace(reader_);
-    // Seeds know nothing of where the source ends, beyond which no ground casts shadows.
-    if (shadow_seed_info(metadata) && is_covered()) seeds_.emplace(reader_);
+    if (shadow_seed_info(metadata)) seeds_.emplace(reader_);
   }
 
   [[nodiscard]] const TileGrid& grid() const override { return grid_; }
@@ -161,13 +160,6 @@ class ArchiveSource final : public TileSource {
             scale_.offset + scale_.scale * entry.code_max};
   }
 
-  /// Whether the source covers the whole world, to a hair of a lattice step.
-  [[nodiscard]] bool is_covered() const {
-    const WorldBounds all = covered();
-    const double hair = kSameFall * grid_.sigma_x();
-    return all.x0 <= hair && all.z0 <= hair && all.x1 >= grid_.world_width() - hair &&
-           all.z1 >= grid_.world_height() - hair;
-  }
   /// Codes here for one that is stored, or for a unit of elevations where these are.
   [[nodiscard]] double code_per_stored() const { return is_float() ? world_per_elevation_ / scale_.scale : 1.0; }
 

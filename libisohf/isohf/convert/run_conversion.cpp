@@ -120,7 +120,7 @@ void make_tile(const Conversion& conversion, const CodeSource& source, const Cou
   if (!counts) {
     tile.encoded = nothing.encoded;
     tile.encoded.statistics = tile_statistics(counted, tile.index, nothing.codes, conversion.quantisation);
-    if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(nothing.codes);
+    if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(tile.index, nothing.codes);
     tile.seeds.is_empty = true;
     return;
   }
@@ -134,7 +134,7 @@ void make_tile(const Conversion& conversion, const CodeSource& source, const Cou
   encoded.statistics.clamped = tile.outliers.counted;
   encoded.statistics.worst_rounding = counts->worst_rounding;
   if (stages.planes != nullptr && is_new) tile.planes = stages.planes->sample(codes, encoded);
-  if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(codes);
+  if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(tile.index, codes);
   tile.seeds.is_empty = encoded.is_empty;
   if (stages.textures != nullptr && is_new && !encoded.is_empty) tile.texture = stages.textures->encode(tile.index);
 }
@@ -392,7 +392,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
       if (options.shadow_seeds) {
         // Lengths of both kinds are compared as metres where both are known to be.
         const bool known = plan.frame.in_metres && !info.vertical_unit.empty();
-        seeds.emplace(plan.grid, conversion.quantisation, *options.shadow_seeds,
+        seeds.emplace(plan.grid, plan.frame.bounds(), conversion.quantisation, *options.shadow_seeds,
                       known ? 1.0 / info.metres_per_vertical_unit : 1.0,
                       memory.seeds_in_scratch ? ScratchFolder(job.scratch_folder) : std::nullopt);
       }

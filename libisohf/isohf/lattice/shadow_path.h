@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -34,6 +35,11 @@ enum class LightTravel { kEastward, kWestward };
 /// A tile's width in half steps, 2(C-4).
 [[nodiscard]] inline int half_steps_across(const TileShape& shape) {
   return 2 * shape.cell_columns();
+}
+
+/// The last step of `sigma` that the source covers, whose ground extends to `end`; nothing beyond it casts shadows.
+[[nodiscard]] inline std::int64_t last_casting_step(double end, double sigma) {
+  return static_cast<std::int64_t>(std::floor(end / sigma + 1e-6));
 }
 
 /// Distance from a tile's edge of the last vertex of the row before it: what the tile stores in column 0 and behind its

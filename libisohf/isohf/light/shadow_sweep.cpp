@@ -13,6 +13,8 @@ namespace {
 constexpr float kVoidHeight = std::numeric_limits<float>::quiet_NaN();
 /// Quotients this near to 0 or 1 are those of the lattice's own directions, rounded.
 constexpr double kOnLattice = 1e-9;
+/// Steps this near to the end of those that cast shadows count as on it.
+constexpr double kAtEnd = 1e-6;
 /// Columns that are turned into steps together: as many as share cache lines.
 constexpr int kColumnsTogether = 16;
 /// Tiles beside each other whose rows are read together.
@@ -155,13 +157,21 @@ std::optional<LightTravel> ShadowSweep::travel() const {
   return mirrored_ ? LightTravel::kWestward : LightTravel::kEastward;
 }
 
-ShadowSweep::State ShadowSweep::entering(const CasterRows& casters, std::span<const float> tile) const {
+ShadowSweep::State ShadowSweep::entering(std::int64_t tile_row, const CasterRows& casters,
+                                         std::span<const float> tile) const {
   if (columns_before_ == 0) return {};  // padding there is beyond all tiles
   const TileShape& shape = grid_.shape();
   const auto lines = static_cast<std::size_t>(shape.rows()) + 1;
   State state(2 * edges_.size() * lines, kVoidHeight);
+  const ShadowFront::Casting columns = casting_columns();
+  const ShadowFront::Casting casting = casting_rows(tile_row);
   for (std::size_t e = 0; e < edges_.size(); ++e) {
     for (int row = 1; row <= visible_rows(shape); ++row) {
+      const auto casts = [&](double distance, float height) {
+        const bool is_covered = row >= casting.first - kAtEnd && row <= casting.last + kAtEnd &&
+                                -distance >= columns.first - kAtEnd && -distance <= columns.last + kAtEnd;
+        return is_covered ? height : kVoidHeight;
+      };
       float highest = -std::numeric_limits<float>::infinity();
       std::int64_t ran = columns_before_ * half_steps_;
       std::int64_t place = 1;
@@ -179,9 +189,9 @@ ShadowSweep::State ShadowSweep::entering(const CasterRows& casters, std::span<co
       }
       const float* const stored = tile.data() + row * shape.columns();
       const int last = last_visible_column(shape, row);
-      const float before = mirrored_ ? stored[last + 1] : stored[0];
+      const float before = casts(padding_distance(row), mirrored_ ? stored[last + 1] : stored[0]);
       meet(before, padding_distance(row));
-      if (padding_distance(row) > 1) meet(middle(before, mirrored_ ? stored[last] : stored[1]), 1);
+      if (padding_distance(row) > 1) meet(middle(before, casts(0.0, mirrored_ ? stored[last] : stored[1])), 1);
       float* const line = state.data() + 2 * e * lines + static_cast<std::size_t>(row) + 1;
       line[0] = highest;
       line[lines] = static_cast<float>(ran);
@@ -252,7 +262,7 @@ ShadowSweep::State ShadowSweep::pass_along_rows(std::int64_t tile_row, const Sta
     }
     if (mirrored_) std::reverse(profile.begin(), profile.end());
     if (step == shape.cell_rows() + 1) leaving = front.lines();
-    const bool casts = step >= rows.first - 1e-6 && step <= rows.last + 1e-6;
+    const bool casts = step >= rows.first - kAtEnd && step <= rows.last + kAtEnd;
     front.advance(profile.data() + 1, casts ? columns : ShadowFront::Casting{1.0, 0.0},
                   hidden != nullptr ? found.data() : nullptr);
     if (hidden == nullptr) continue;
@@ -292,11 +302,15 @@ ShadowSweep::State ShadowSweep::pass_along_columns(std::int64_t tile_row, const 
     const std::int64_t stride = tiles * shape.columns();
     std::vector<float> made(hidden != nullptr ? static_cast<std::size_t>(stride * lanes) : 0);
     for (std::int64_t i = 0; i < tiles; ++i) {
-      const std::ptrdiff_t column = (mirrored_ ? tiles - 1 - i : i) * shape.columns();
+      const std::int64_t tile = mirrored_ ? tiles - 1 - i : i;
+      const std::ptrdiff_t column = tile * shape.columns();
+      const std::int64_t end = last_casting_step(ground_.x1, grid_.sigma_x()) - (first_tile + tile) * half_steps_;
       for (int row = 0; row < lanes; ++row) {
         const int lane = from_south_ ? lanes - 1 - row : row;
         float* const out = spread_rows.data() + static_cast<std::size_t>(lane) * across;
         spread(shape, vertices.row(row).data() + column, row % 2 != 0, out);
+        // Light along the rows meets vertices alone: the middle between the last covered one and the next casts nothing.
+        if (travel() && end > 0 && end < half_steps_ && (end % 2 != 0) == (row % 2 != 0)) out[end] = kVoidHeight;
         if (mirrored_) std::reverse(out, out + across);
       }
       for (std::size_t first = 0; first < across; first += kColumnsTogether) {
@@ -320,7 +334,7 @@ ShadowSweep::State ShadowSweep::pass_along_columns(std::int64_t tile_row, const 
           entered += front.carried();
         }
         const auto at = static_cast<double>(steps);
-        const bool casts = at >= columns.first - 1e-6 && at <= columns.last + 1e-6;
+        const bool casts = at >= columns.first - kAtEnd && at <= columns.last + kAtEnd;
         front.advance(profiles.data() + x * lane_stride + 1, casts ? rows : ShadowFront::Casting{1.0, 0.0},
                       found.data() + x * static_cast<std::size_t>(lanes));
       }

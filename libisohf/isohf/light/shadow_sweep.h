@@ -91,9 +91,9 @@ class ShadowSweep {
 
   /// In what state light enters a tile that begins the grid, where it has a travel(). The grid's tiles alone then give
   /// the same shadows as all tiles before them do.
-  /// casters  in the unit of heights; all ground casts, and the falls of the sun's edges are among those that they are for
+  /// casters  on the same ground, in the unit of heights; the falls of the sun's edges are among those that they are for
   /// tile     [C*R] heights, padding included, NaN where void
-  [[nodiscard]] State entering(const CasterRows& casters, std::span<const float> tile) const;
+  [[nodiscard]] State entering(std::int64_t tile_row, const CasterRows& casters, std::span<const float> tile) const;
 
   /// Passes over a row of tiles.
   /// entering  what the row before it left; empty: nothing, at the first row. Or the state that entering() gives

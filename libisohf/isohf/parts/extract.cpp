@@ -101,7 +101,8 @@ class Extraction {
         counted_(metadata),
         void_codes_(void_tile(metadata.grid.shape(), metadata.quantisation)),
         void_digest_(tile_content_digest(void_codes_)) {
-    if (const auto info = shadow_seed_info(metadata)) seeds_.emplace(metadata.grid, metadata.quantisation, *info);
+    if (const auto info = shadow_seed_info(metadata))
+      seeds_.emplace(metadata.grid, metadata.quantisation, *info, metadata.valid);
     for (const MemberTable& table : from.tables()) {
       const bool is_by_tile = table.name.find("{column}") != std::string::npos;
       if (plane == 0 && is_by_tile && !table.name.starts_with("seeds/") && !is_in_tile_folder(table.name))
@@ -167,7 +168,7 @@ class Extraction {
     }
     encoded.content_digest = entry.stored ? tile_content_digest(codes) : void_digest_;
     encoded.statistics = tile_statistics(counted_, index, codes, metadata_.quantisation);
-    if (seeds_) tile.seeds = seeds_->prepare(codes);
+    if (seeds_) tile.seeds = seeds_->prepare(index, codes);
     tile.seeds.is_empty = encoded.is_empty;
     return tile;
   }

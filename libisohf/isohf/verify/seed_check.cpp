@@ -11,7 +11,10 @@
 namespace isohf {
 
 SeedCheck::SeedCheck(const ArchiveReader& archive, const ShadowSeedInfo& info, const ScratchFolder& scratch)
-    : archive_(archive), info_(info), row_(archive.grid(), archive.metadata().quantisation, info), tiles_(scratch) {
+    : archive_(archive),
+      info_(info),
+      row_(archive.grid(), archive.metadata().quantisation, info, archive.metadata().valid),
+      tiles_(scratch) {
   if (!has_room_for_seeds(archive.grid())) {
     throw Error(ErrorCode::kCorrupt, "shadow_seeds: a grid of so many columns has none");
   }
@@ -44,8 +47,8 @@ std::string SeedCheck::why_wrong(TileIndex tile, const EncodedSeeds& expected) c
                      found->second->name);
 }
 
-SeedRow::Tile SeedCheck::prepare(const TileCodes* codes) const {
-  if (codes != nullptr) return row_.prepare(*codes);
+SeedRow::Tile SeedCheck::prepare(TileIndex index, const TileCodes* codes) const {
+  if (codes != nullptr) return row_.prepare(index, *codes);
   return {{no_casters(archive_.grid().shape()), no_casters(archive_.grid().shape())}, {}, true};
 }
 

@@ -23,7 +23,7 @@ class SeedCheck {
   SeedCheck(const ArchiveReader& archive, const ShadowSeedInfo& info, const ScratchFolder& scratch);
 
   /// Of any tile, nullptr where it is not stored; on any thread.
-  [[nodiscard]] SeedRow::Tile prepare(const TileCodes* codes) const;
+  [[nodiscard]] SeedRow::Tile prepare(TileIndex index, const TileCodes* codes) const;
   /// The next tile of a row, from West to East.
   void add(const SeedRow::Tile& tile) { tiles_.add(tile); }
   /// Whether the row that has been added is to be checked, or forgotten. On the caller's oneTBB arena.

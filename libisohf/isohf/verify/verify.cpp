@@ -272,7 +272,8 @@ class Verification {
     oneapi::tbb::parallel_for(std::size_t{0}, read.size(), [&](std::size_t i) {
       const TileIndex index{first.column + static_cast<std::int64_t>(i), first.row};
       if (find_entry(index, read[i])) read_tile(index, read[i]);
-      if (seeds_ && read[i].readable) read[i].seeds = seeds_->prepare(read[i].entry.stored ? &read[i].codes : nullptr);
+      if (!seeds_ || !read[i].readable) return;
+      read[i].seeds = seeds_->prepare(index, read[i].entry.stored ? &read[i].codes : nullptr);
     });
   }
 

@@ -4,6 +4,7 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "isohf/archive/writer.h"
@@ -55,22 +56,43 @@ CasterRows read_casters(const SpillBuffer& bytes, std::uint64_t at) {
 
 }  // namespace
 
-SeedRow::SeedRow(const TileGrid& grid, const Quantisation& quantisation, const ShadowSeedInfo& info)
-    : grid_(grid), quantisation_(quantisation) {
-  fall_min_ = info.fall_per_half_step(grid, quantisation, info.sun_min_deg);
+SeedRow::SeedRow(const TileGrid& grid, const Quantisation& quantisation, const ShadowSeedInfo& info,
+                 const WorldBounds& valid)
+    : grid_(grid),
+      quantisation_(quantisation),
+      fall_min_(info.fall_per_half_step(grid, quantisation, info.sun_min_deg)),
+      last_x_(last_casting_step(valid.x1, grid.sigma_x())),
+      last_z_(last_casting_step(valid.z1, grid.sigma_z())) {}
+
+TileCasters SeedRow::casters(const TileCodes& codes) const {
+  const TileShape& shape = grid_.shape();
+  if (codes.type == CodeType::kF32) {
+    return tile_casters(shape, {codes.heights.data(), shape.columns(), shape.rows()}, fall_min_);
+  }
+  return tile_casters(shape, {codes.codes.data(), shape.columns(), shape.rows()},
+                      static_cast<std::uint16_t>(quantisation_.void_code()), fall_min_);
 }
 
-SeedRow::Tile SeedRow::prepare(const TileCodes& codes) const {
+SeedRow::Tile SeedRow::prepare(TileIndex index, const TileCodes& codes) const {
   const TileShape& shape = grid_.shape();
-  Tile tile;
-  if (codes.type == CodeType::kF32) {
-    tile.casters = tile_casters(shape, {codes.heights.data(), shape.columns(), shape.rows()}, fall_min_);
-  } else {
-    tile.casters = tile_casters(shape, {codes.codes.data(), shape.columns(), shape.rows()},
-                                static_cast<std::uint16_t>(quantisation_.void_code()), fall_min_);
+  const std::int64_t west = index.column * half_steps_across(shape);
+  const std::int64_t north = index.row * shape.cell_rows();
+  if (west + half_steps_across(shape) <= last_x_ && north + shape.cell_rows() <= last_z_) {
+    return {casters(codes), tile_edges(shape, codes)};
   }
-  tile.edges = tile_edges(shape, codes);
-  return tile;
+  TileCodes covered = codes;
+  for (int row = 1; row <= visible_rows(shape); ++row) {
+    for (int column = 1; column <= last_visible_column(shape, row); ++column) {
+      if (west + object_x(shape.columns(), column, row) <= last_x_ && north + row - 1 <= last_z_) continue;
+      const auto at = static_cast<std::size_t>(row * shape.columns() + column);
+      if (codes.type == CodeType::kF32) {
+        covered.heights[at] = std::numeric_limits<float>::quiet_NaN();
+      } else {
+        covered.codes[at] = static_cast<std::uint16_t>(quantisation_.void_code());
+      }
+    }
+  }
+  return {casters(covered), tile_edges(shape, codes)};
 }
 
 EncodedSeeds SeedRow::encode(const TileEdges& edges, const HullSeeds& seeds) const {

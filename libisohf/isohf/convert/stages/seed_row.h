@@ -16,8 +16,9 @@ class ArchiveWriter;
 /// on nothing else, bit for bit.
 class SeedRow {
  public:
-  /// info: its kind, suns and units.
-  SeedRow(const TileGrid& grid, const Quantisation& quantisation, const ShadowSeedInfo& info);
+  /// info   its suns and units
+  /// valid  the part of the world that the source covers; nothing beyond it casts shadows
+  SeedRow(const TileGrid& grid, const Quantisation& quantisation, const ShadowSeedInfo& info, const WorldBounds& valid);
 
   /// What one tile brings along.
   struct Tile {
@@ -26,7 +27,7 @@ class SeedRow {
     bool is_empty = false;  ///< not stored, has no seeds
   };
   /// Any tile, on any thread.
-  [[nodiscard]] Tile prepare(const TileCodes& codes) const;
+  [[nodiscard]] Tile prepare(TileIndex index, const TileCodes& codes) const;
 
   /// What the tiles of a row bring along, from West to East; in a scratch file where there is a folder for one.
   class Tiles {
@@ -61,11 +62,14 @@ class SeedRow {
   [[nodiscard]] static std::uint64_t memory_bytes(const TileGrid& grid, bool in_scratch);
 
  private:
+  [[nodiscard]] TileCasters casters(const TileCodes& codes) const;
   [[nodiscard]] EncodedSeeds encode(const TileEdges& edges, const HullSeeds& seeds) const;
 
   TileGrid grid_;
   Quantisation quantisation_;
   double fall_min_;
+  std::int64_t last_x_;  ///< on the lattice, of what the source covers
+  std::int64_t last_z_;
 };
 
 }  // namespace isohf

@@ -36,11 +36,12 @@ void check_seed_request(const ShadowSeedRequest& request, const SourceInfo& info
   }
 }
 
-SeedStage::SeedStage(const TileGrid& grid, const Quantisation& quantisation, const ShadowSeedRequest& request,
-                     double elevation_units_per_world_unit, const ScratchFolder& scratch)
+SeedStage::SeedStage(const TileGrid& grid, const WorldBounds& valid, const Quantisation& quantisation,
+                     const ShadowSeedRequest& request, double elevation_units_per_world_unit,
+                     const ScratchFolder& scratch)
     : grid_(grid),
       info_(info_of(request, elevation_units_per_world_unit)),
-      row_(grid, quantisation, info_),
+      row_(grid, quantisation, info_, valid),
       tiles_(scratch) {}
 
 std::int64_t SeedStage::first_tile_needed(const TileGrid& grid, std::int64_t next_tile) {

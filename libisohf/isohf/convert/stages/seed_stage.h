@@ -19,12 +19,12 @@ class SeedStage {
  public:
   /// elevation_units_per_world_unit as in ShadowSeedInfo.
   /// scratch  keeps what the tiles of a row bring along where memory has no room for it
-  SeedStage(const TileGrid& grid, const Quantisation& quantisation, const ShadowSeedRequest& request,
-            double elevation_units_per_world_unit, const ScratchFolder& scratch);
+  SeedStage(const TileGrid& grid, const WorldBounds& valid, const Quantisation& quantisation,
+            const ShadowSeedRequest& request, double elevation_units_per_world_unit, const ScratchFolder& scratch);
 
   using Tile = SeedRow::Tile;
   /// Any tile, on any thread.
-  [[nodiscard]] Tile prepare(const TileCodes& codes) const { return row_.prepare(codes); }
+  [[nodiscard]] Tile prepare(TileIndex index, const TileCodes& codes) const { return row_.prepare(index, codes); }
 
   /// The tile with which a writer that goes on at `next_tile` must begin: whose seeds are not yet written.
   [[nodiscard]] static std::int64_t first_tile_needed(const TileGrid& grid, std::int64_t next_tile);
