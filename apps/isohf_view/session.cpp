@@ -37,9 +37,12 @@ TileBoxLimits limits_from(const TileSource& source, const Options& options) {
   const std::uint64_t boxes = static_cast<std::uint64_t>(planes_of(source).count()) + 1;
   const std::uint64_t least = kTilesAtLeast * boxes * TileBox::most_bytes_of_a_tile(source);
   limits.enough_mib = (source.textures() == nullptr ? 1 : 3) * ((least >> 20U) + 1);
-  const int cores = static_cast<int>(std::thread::hardware_concurrency());
-  limits.workers = options.threads > 0 ? options.threads : std::max(1, cores - 1);
   return limits;
+}
+
+int worker_count(const Options& options) {
+  const int cores = static_cast<int>(std::thread::hardware_concurrency());
+  return options.threads > 0 ? options.threads : std::max(1, cores - 1);
 }
 
 const std::vector<std::string> kHelpLines{"left drag    move the ground         wheel         zoom",
@@ -85,7 +88,8 @@ Session::Session(const TileSource& source, const Options& options)
       whole_(whole_bounds(source)),
       shared_(shared_geometry(source)),
       renderer_(source, shared_),
-      boxes_(source, shared_, limits_from(source, options)),
+      workers_(worker_count(options)),
+      boxes_(source, shared_, limits_from(source, options), workers_),
       far_distance_(options.far_distance) {
   const int levels = planes_of(source).levels();
   for (const std::optional<double>& level : {view.fixed_level, view.other_level}) {
@@ -99,10 +103,10 @@ Session::Session(const TileSource& source, const Options& options)
     // Coarse planes are drawn with one picture of all, which gets an eighth.
     std::uint64_t bytes = texture_bytes(source, options);
     if (source.planes() != nullptr) {
-      texture_overview_.emplace(source, bytes / 8);
+      texture_overview_.emplace(source, bytes / 8, workers_);
       bytes -= bytes / 8;
     }
-    textures_.emplace(source, bytes, limits_from(source, options).workers);
+    textures_.emplace(source, bytes, workers_);
     renderer_.set_textures(
         [this](PlaneTile at) { return at.plane == 0 ? textures_->texture(at.tile) : texture_overview_->texture(); });
     if (!options.mode) view.mode = ColourMode::kTexture;
@@ -234,7 +238,7 @@ bool Session::is_settled() const {
   const TileBoxFigures& box = boxes_.figures();
   if (box.missing_tiles > 0 || box.shadows_to_come > 0) return false;
   if (!shows_textures()) return true;
-  return textures_->figures().to_come == 0 && (!texture_overview_ || texture_overview_->to_come() == 0);
+  return textures_->figures().to_come == 0 && (!texture_overview_ || texture_overview_->is_whole());
 }
 
 void Session::draw_overlay(const Shown& shown) {

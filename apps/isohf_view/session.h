@@ -97,6 +97,7 @@ class Session {
   TileBounds whole_;
   SharedGeometry shared_;
   Renderer renderer_;
+  Workers workers_;  ///< of all that follow
   PlaneBoxes boxes_;
   std::optional<TextureBox> textures_;
   std::optional<TextureOverview> texture_overview_;  ///< where there are planes

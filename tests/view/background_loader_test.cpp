@@ -33,11 +33,12 @@ TEST(BackgroundLoader, GivesEachTileOnceAsTheArchiveHasIt) {
   const TileGrid& grid = archive.grid();
   std::set<std::int64_t> seen;
   {
+    Workers workers(4);
     BackgroundLoader<TileIndex, Loaded> loader(
         [&](const TileIndex& tile) {
           return Loaded{tile, archive.read_tile(tile)};
         },
-        4);
+        workers);
     std::deque<Loaded> ready;
     for (std::int64_t flat = 0; flat < grid.tile_count() || loader.in_flight() > 0;) {
       if (flat < grid.tile_count()) loader.request(grid.tile_at(flat++));

@@ -18,17 +18,16 @@ namespace isohf::test {
 /// The analytic surface as a tile source; `alter` may change a tile's codes, `before_read` may hold up whoever reads.
 class MemoryTiles final : public view::TileSource {
  public:
+  static constexpr view::ViewScale kScale{-20.0, 0.002};
   using Alter = std::function<void(TileIndex, std::vector<std::uint16_t>&)>;
 
   explicit MemoryTiles(const TileGrid& grid, Alter alter = {}, std::function<void()> before_read = {})
-      : grid_(grid), alter_(std::move(alter)), before_read_(std::move(before_read)) {
+      : TileSource(view::facts_of(grid, kScale)), alter_(std::move(alter)), before_read_(std::move(before_read)) {
     for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) bounds_.push_back(measure(grid.tile_at(flat)));
   }
 
-  [[nodiscard]] const TileGrid& grid() const override { return grid_; }
-  [[nodiscard]] view::ViewScale scale() const override { return {-20.0, 0.002}; }
   [[nodiscard]] view::TileBounds bounds(TileIndex tile) const override {
-    return bounds_[static_cast<std::size_t>(grid_.flat_index(tile))];
+    return bounds_[static_cast<std::size_t>(grid().flat_index(tile))];
   }
   void read(TileIndex tile, std::span<std::uint16_t> codes) const override {
     if (before_read_) before_read_();
@@ -46,7 +45,7 @@ class MemoryTiles final : public view::TileSource {
   }
 
   /// On that planet or moon.
-  void set_body(const std::string& body) { metadata_.emplace(grid_).source.body = body; }
+  void set_body(const std::string& body) { metadata_.emplace(grid()).source.body = body; }
   [[nodiscard]] const Metadata* metadata() const override { return metadata_ ? &*metadata_ : nullptr; }
 
   mutable std::atomic<int> reads{0};
@@ -67,12 +66,11 @@ class MemoryTiles final : public view::TileSource {
     return bounds;
   }
   [[nodiscard]] std::vector<std::uint16_t> make(TileIndex tile) const {
-    auto codes = analytic_tile(grid_, tile);
+    auto codes = analytic_tile(grid(), tile);
     if (alter_) alter_(tile, codes);
     return codes;
   }
 
-  TileGrid grid_;
   Alter alter_;
   std::function<void()> before_read_;
   std::vector<view::TileBounds> bounds_;

@@ -52,7 +52,7 @@ TEST(PlaneChoice, DrawsEachPlaceOnceAndNeighboursAtMostOnePlaneApart) {
     };
     const PlaneWishes wishes{[](PlaneTile) { return true; }, [&](PlaneTile at) { return draw(finer, at, 0.8); },
                              [&](PlaneTile at) { return draw(resident, at, 0.995); }};
-    const std::vector<ChosenTile> chosen = choose_tiles(planes, {0, 0, 0, 0}, wishes);
+    const std::vector<ChosenTile> chosen = choose_tiles(planes, {{0, 0}, {1, 1}}, wishes);
     const auto plane_at = cover(planes, chosen);
     ASSERT_EQ(plane_at.size(), static_cast<std::size_t>(grid.tile_count()));
     for (const auto& [place, plane] : plane_at) {
@@ -84,21 +84,19 @@ TEST(PlaneChoice, WithoutPlanesDrawsTheTilesOfTheRange) {
   const Planes planes(grid, 0, 0, false);
   const PlaneWishes wishes{[](PlaneTile at) { return at.tile.column != 3; }, [](PlaneTile) { return true; },
                            [](PlaneTile) { return false; }};
-  EXPECT_EQ(choose_tiles(planes, {2, 5, 7, 8}, wishes).size(), 6U);
+  EXPECT_EQ(choose_tiles(planes, {{2, 7}, {6, 9}}, wishes).size(), 6U);
 }
 
 /// The analytic surface with coarse planes, decimated vertex by vertex.
 class MemoryPlanes final : public TileSource {
  public:
-  explicit MemoryPlanes(const TileGrid& grid)
-      : tiles_(grid), planes_(grid, plane_stride(grid.shape()), plane_count(grid, plane_stride(grid.shape())), false) {
-    for (int plane = 1; plane <= planes_.count(); ++plane) coarse_.push_back(std::make_unique<Coarse>(*this, plane));
+  explicit MemoryPlanes(const TileGrid& grid) : TileSource(facts_of(grid, test::MemoryTiles::kScale)), tiles_(grid) {
+    const int stride = plane_stride(grid.shape());
+    facts_.planes.emplace(grid, stride, plane_count(grid, stride), false);
+    for (int plane = 1; plane <= planes()->count(); ++plane) coarse_.push_back(std::make_unique<Coarse>(*this, plane));
   }
-  [[nodiscard]] const TileGrid& grid() const override { return tiles_.grid(); }
-  [[nodiscard]] ViewScale scale() const override { return tiles_.scale(); }
   [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return tiles_.bounds(tile); }
   void read(TileIndex tile, std::span<std::uint16_t> codes) const override { tiles_.read(tile, codes); }
-  [[nodiscard]] const Planes* planes() const override { return &planes_; }
   [[nodiscard]] const TileSource& plane(int plane) const override {
     if (plane == 0) return *this;
     return *coarse_[static_cast<std::size_t>(plane) - 1];
@@ -107,12 +105,10 @@ class MemoryPlanes final : public TileSource {
  private:
   class Coarse final : public TileSource {
    public:
-    Coarse(const MemoryPlanes& whole, int plane) : whole_(whole), plane_(plane) {}
-    [[nodiscard]] const TileGrid& grid() const override { return whole_.planes_.grid(plane_); }
-    [[nodiscard]] ViewScale scale() const override { return whole_.scale(); }
-    [[nodiscard]] WorldBounds covered() const override { return whole_.covered(); }
+    Coarse(const MemoryPlanes& whole, int plane)
+        : TileSource({whole.planes()->grid(plane), whole.scale(), whole.covered()}), whole_(whole), plane_(plane) {}
     [[nodiscard]] TileBounds bounds(TileIndex tile) const override {
-      const isohf::TileRange range = whole_.planes_.below(plane_, tile);
+      const TileRange range = whole_.planes()->below(plane_, tile);
       TileBounds all{false, false, 1e9, -1e9};
       for (std::int64_t row = range.first.row; row < range.end.row; ++row) {
         for (std::int64_t column = range.first.column; column < range.end.column; ++column) {
@@ -128,8 +124,8 @@ class MemoryPlanes final : public TileSource {
       for (int row = 0; row < own.shape().rows(); ++row) {
         for (int column = 0; column < own.shape().columns(); ++column) {
           const LatticeVertex at = own.lattice_vertex(tile, {column, row});
-          codes[i++] =
-              whole_.planes_.is_beyond(plane_, at) ? kVoidCode : test::analytic_code(whole_.planes_.place(plane_, at));
+          codes[i++] = whole_.planes()->is_beyond(plane_, at) ? kVoidCode
+                                                              : test::analytic_code(whole_.planes()->place(plane_, at));
         }
       }
     }
@@ -140,7 +136,6 @@ class MemoryPlanes final : public TileSource {
   };
 
   test::MemoryTiles tiles_;
-  Planes planes_;
   std::vector<std::unique_ptr<Coarse>> coarse_;
 };
 

@@ -24,12 +24,13 @@ TileGrid small_grid() {
 struct DrawnGround {
   explicit DrawnGround(const test::MemoryTiles& source)
       : shared(source.grid().shape(), make_index_arrays(source.grid().shape())),
-        box(source, shared, {}),
+        box(source, shared, {}, workers),
         renderer(source, shared) {
     renderer.set_palette({{0.0, 90, 160, 80}}, 0.0, 1.0);
   }
 
   const SharedGeometry shared;
+  Workers workers{2};
   TileBox box;
   Renderer renderer;
 };

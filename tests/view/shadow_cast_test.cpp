@@ -129,15 +129,15 @@ TEST(CastShadows, AreThoseOfAllTilesTogether) {
 
 TEST(CastShadows, ReadNoMoreThanMayCast) {
   const MemoryTiles source(grid());
-  const TileRange one{2, 2, 2, 2};
+  const TileRange one{{2, 2}, {3, 3}};
   const CastingLimits limits;
   // From high above only what is near.
-  EXPECT_EQ(casting_range(source, {315.0, 89.0}, one, limits), (TileRange{1, 3, 1, 2}));
-  EXPECT_EQ(casting_range(source, {90.0, 89.0}, one, limits), (TileRange{2, 3, 2, 2}));
-  EXPECT_EQ(casting_range(source, {180.0, 0.1}, one, limits), (TileRange{2, 2, 2, 3}));
-  EXPECT_EQ(casting_range(source, {225.0, 0.1}, one, limits), (TileRange{0, 3, 2, 3}));
-  EXPECT_EQ(casting_range(source, {270.0, 0.1}, one, {2, 100}), (TileRange{1, 2, 2, 2}));
-  EXPECT_EQ(casting_range(source, {270.0, 0.1}, one, {100, 2}), (TileRange{1, 2, 2, 2}));
+  EXPECT_EQ(casting_range(source, {315.0, 89.0}, one, limits), (TileRange{{1, 1}, {4, 3}}));
+  EXPECT_EQ(casting_range(source, {90.0, 89.0}, one, limits), (TileRange{{2, 2}, {4, 3}}));
+  EXPECT_EQ(casting_range(source, {180.0, 0.1}, one, limits), (TileRange{{2, 2}, {3, 4}}));
+  EXPECT_EQ(casting_range(source, {225.0, 0.1}, one, limits), (TileRange{{0, 2}, {4, 4}}));
+  EXPECT_EQ(casting_range(source, {270.0, 0.1}, one, {2, 100}), (TileRange{{1, 2}, {3, 3}}));
+  EXPECT_EQ(casting_range(source, {270.0, 0.1}, one, {100, 2}), (TileRange{{1, 2}, {3, 3}}));
 }
 
 TEST(CastShadows, SayWhatCouldNotBeRead) {

@@ -26,21 +26,21 @@ using test::MemoryPhoto;
 class TexturedPlain final : public TileSource {
  public:
   TexturedPlain(MemoryPhoto& photo, int size, int levels)
-      : plain_(TileGrid::make(TileShape::make(20, 19, 2), 3, 2, 100.0, 100.0),
+      : TileSource(facts_of(TileGrid::make(TileShape::make(20, 19, 2), 3, 2, 100.0, 100.0), test::MemoryTiles::kScale)),
+        plain_(grid(),
                [](TileIndex, std::vector<std::uint16_t>& codes) { std::fill(codes.begin(), codes.end(), 10000); }),
         photo_(photo),
         cutter_(grid(), {150.0 / width(photo), 100.0 / height(photo), 300.0 / width(photo), 200.0 / height(photo)},
                 {size, levels}) {
-    info_.channels = photo.info().channels;
-    info_.size = size;
-    info_.levels = levels;
+    TextureInfo info;
+    info.channels = photo.info().channels;
+    info.size = size;
+    info.levels = levels;
+    facts_.textures = info;
   }
 
-  [[nodiscard]] const TileGrid& grid() const override { return plain_.grid(); }
-  [[nodiscard]] ViewScale scale() const override { return plain_.scale(); }
   [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return plain_.bounds(tile); }
   void read(TileIndex tile, std::span<std::uint16_t> codes) const override { plain_.read(tile, codes); }
-  [[nodiscard]] const TextureInfo* textures() const override { return &info_; }
   [[nodiscard]] bool has_texture(TileIndex tile) const override { return !(tile == without); }
   [[nodiscard]] Picture read_texture(TileIndex tile, int level) const override {
     if (tile == broken) throw Error(ErrorCode::kCorrupt, "member \"textures/0/1/64.png\": broken");
@@ -64,7 +64,6 @@ class TexturedPlain final : public TileSource {
   test::MemoryTiles plain_;
   MemoryPhoto& photo_;
   TextureCutter cutter_;
-  TextureInfo info_;
 };
 
 /// The place at height 0 under the middle of a pixel, rows from the top.
@@ -124,6 +123,8 @@ int resident_level(const TextureBox& box, const TexturedPlain& source, TileIndex
 
 class TextureBoxTest : public test::GlTest {
  protected:
+  Workers workers_{2};
+
   /// What full blue has become under the light there is, 0...1: all colours shrink by their channel's share.
   static double share(const std::vector<std::uint8_t>& pixels, const std::vector<std::uint8_t>& white, std::size_t i) {
     return pixels[i] / static_cast<double>(white[i]);
@@ -203,35 +204,27 @@ TEST_F(TextureBoxTest, ShowsElevationColoursWhereThereIsNoTexture) {
   EXPECT_EQ(picture(holed, options, 150.0, 50.0, 40.0), half);
 }
 
-TEST_F(TextureBoxTest, BeginsWithCoarseLevelsAndKeepsToBudgetAndBound) {
+TEST_F(TextureBoxTest, KeepsToBudgetAndBound) {
   MemoryPhoto photo = waves();
   const TexturedPlain source(photo, 256, 6);
   const std::uint64_t bound = std::uint64_t{8} << 20U;
-  TextureBox box(source, bound, 1);
-  const TileRange range{0, 2, 0, 1};
+  TextureBox box(source, bound, workers_);
+  const TileRange range{{0, 0}, {3, 2}};
   ViewState view;
   view.eye = {150.0, 2.0, 100.0};
   view.height = 2000;
-  bool was_coarse = false;
-  constexpr std::uint64_t kBudget = 20000;
+  // A budget of nothing is a texture a frame.
+  constexpr std::uint64_t kWhole = 4 * (256 * 256 + 128 * 128 + 64 * 64 + 32 * 32 + 16 * 16 + 8 * 8);
   for (int frame = 0; frame < 100000 && (frame == 0 || box.figures().to_come > 0); ++frame) {
-    box.update(range, view, kBudget);
-    EXPECT_LE(box.figures().upload_bytes, kBudget);
+    box.update(range, view, 0);
+    EXPECT_LE(box.figures().upload_bytes, kWhole);
     EXPECT_LE(box.figures().resident_bytes, bound);
     if (box.figures().upload_bytes == 0) std::this_thread::sleep_for(std::chrono::microseconds(200));
-    was_coarse |= resident_level(box, source, {1, 1}) == 3;  // 32 texels
   }
-  EXPECT_TRUE(was_coarse);
   EXPECT_EQ(resident_level(box, source, {1, 1}), 0);
   EXPECT_EQ(box.figures().resident, 6);
-  // A budget of nothing is a row of texels a frame.
-  TextureBox slow(source, bound, 1);
-  for (int frame = 0; frame < 200; ++frame) {
-    slow.update(range, view, 0);
-    EXPECT_LE(slow.figures().upload_bytes, 4U * 256);
-  }
   // From far away the fine levels are not wanted; what is there may stay, what comes is coarse.
-  TextureBox far(source, bound, 1);
+  TextureBox far(source, bound, workers_);
   view.eye.y = 20000.0;
   far.finish(range, view);
   EXPECT_GE(resident_level(far, source, {1, 1}), 3);
@@ -241,13 +234,13 @@ TEST_F(TextureBoxTest, BeginsWithCoarseLevelsAndKeepsToBudgetAndBound) {
 TEST_F(TextureBoxTest, GetsCoarserWhereMemoryEnds) {
   MemoryPhoto photo = waves();
   const TexturedPlain source(photo, 256, 6);
-  const TileRange range{0, 2, 0, 1};
+  const TileRange range{{0, 0}, {3, 2}};
   ViewState view;
   view.eye = {150.0, 1.0, 100.0};
   view.height = 4000;
   int last = 0;
   for (const std::uint64_t bound : {4000000U, 1500000U, 400000U, 60000U, 12000U}) {
-    TextureBox box(source, bound, 2);
+    TextureBox box(source, bound, workers_);
     for (int step = 0; step < 6; ++step) {
       // There and back: what was fine must make room.
       view.eye.x = 30.0 + 48.0 * step;
@@ -258,19 +251,19 @@ TEST_F(TextureBoxTest, GetsCoarserWhereMemoryEnds) {
     last = resident_level(box, source, {2, 0});
   }
   EXPECT_GE(last, 4);
-  EXPECT_THROW(TextureBox(source, 3000, 2), Error);
+  EXPECT_THROW(TextureBox(source, 2000, workers_), Error);
 }
 
 TEST_F(TextureBoxTest, LeavesTilesThatLeaveTheRange) {
   MemoryPhoto photo = waves();
   const TexturedPlain source(photo, 64, 4);
-  TextureBox box(source, 1U << 20U, 1);
+  TextureBox box(source, 1U << 20U, workers_);
   ViewState view;
   view.eye = {150.0, 30.0, 100.0};
-  box.finish({0, 2, 0, 1}, view);
+  box.finish({{0, 0}, {3, 2}}, view);
   EXPECT_EQ(box.figures().resident, 6);
   const std::uint64_t all = box.figures().resident_bytes;
-  box.finish({2, 2, 0, 0}, view);
+  box.finish({{2, 0}, {3, 1}}, view);
   EXPECT_EQ(box.figures().resident, 1);
   EXPECT_EQ(box.texture({0, 0}), 0U);
   EXPECT_NE(box.texture({2, 0}), 0U);
@@ -298,11 +291,11 @@ TEST_F(TextureBoxTest, AnOverviewHoldsEveryTileAtTheLevelThatFits) {
     glGetTexImage(GL_TEXTURE_2D, 0, GL_RGBA, GL_UNSIGNED_BYTE, texels.data());
     return texels;
   };
-  // 3 x 2 tiles of 64 x 64 texels, and a third for mip levels, are 131072 bytes.
-  for (const auto& [bytes, level] : {std::pair{131072U, 0}, {131071U, 1}, {2048U, 3}}) {
-    TextureOverview overview(plain, bytes);
+  // 3 x 2 tiles of 64 x 64 texels, a third for mip levels, and as much on its way are 229376 bytes.
+  for (const auto& [bytes, level] : {std::pair{229376U, 0}, {229375U, 1}, {3584U, 3}}) {
+    TextureOverview overview(plain, bytes, workers_);
     overview.finish();
-    EXPECT_EQ(overview.to_come(), 0);
+    EXPECT_TRUE(overview.is_whole());
     const int size = 64 >> level;
     const auto texels = texels_of(overview.texture(), 3 * size, 2 * size);
     for (const TileIndex tile : {TileIndex{0, 0}, {1, 0}, {2, 0}, {0, 1}, {1, 1}, {2, 1}}) {
@@ -315,9 +308,9 @@ TEST_F(TextureBoxTest, AnOverviewHoldsEveryTileAtTheLevelThatFits) {
       }
     }
   }
-  EXPECT_EQ(TextureOverview(plain, 2047).texture(), 0U);
+  EXPECT_EQ(TextureOverview(plain, 3583, workers_).texture(), 0U);
   plain.broken = {1, 0};
-  TextureOverview broken(plain, 131072);
+  TextureOverview broken(plain, 229376, workers_);
   broken.finish();
   EXPECT_EQ(broken.error(), "member \"textures/0/1/64.png\": broken");
 }

@@ -50,14 +50,15 @@ class TileBoxTest : public test::GlTest {
  protected:
   static TileBoxLimits limits_for(std::uint64_t tiles, std::uint64_t per_frame) {
     const std::uint64_t bytes = TileSlot::bytes(wide_grid().shape());
-    return {tiles * bytes, per_frame * bytes, 2};
+    return {tiles * bytes, per_frame * bytes};
   }
+  Workers workers_{2};
 };
 
 TEST_F(TileBoxTest, HoldsTheBoundingSquareOfTheCircle) {
   const MemoryTiles source(wide_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
-  TileBox box(source, shared, {});
+  TileBox box(source, shared, {}, workers_);
   box.finish({1550.0, 1050.0}, 220.0);
   for (std::int64_t row = 0; row < 20; ++row) {
     for (std::int64_t column = 0; column < 30; ++column) {
@@ -72,10 +73,10 @@ TEST_F(TileBoxTest, HoldsTheBoundingSquareOfTheCircle) {
 TEST_F(TileBoxTest, SwapsOnlyWhatEntersWhenItMovesByOneTile) {
   const MemoryTiles source(wide_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
-  TileBox box(source, shared, {});
+  TileBox box(source, shared, {}, workers_);
   box.finish({1050.0, 1050.0}, 300.0);
   const int reads = source.reads;
-  const std::int64_t rows = box.range().last_row - box.range().first_row + 1;
+  const std::int64_t rows = box.range().end.row - box.range().first.row;
   box.finish({1150.0, 1050.0}, 300.0);
   EXPECT_EQ(source.reads - reads, rows);
   box.finish({1150.0, 1050.0}, 300.0);
@@ -87,7 +88,7 @@ TEST_F(TileBoxTest, NeverExceedsItsMemoryAndSaysHowFarItReaches) {
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
   for (const std::uint64_t tiles : {20, 60, 130}) {
     const TileBoxLimits limits = limits_for(tiles, 2);
-    TileBox box(source, shared, limits);
+    TileBox box(source, shared, limits, workers_);
     for (int step = 0; step < 60; ++step) {
       box.update({40.0 * step, 30.0 * step}, 900.0);
       EXPECT_LE(box.figures().resident_bytes, limits.memory_bytes);
@@ -107,7 +108,7 @@ TEST_F(TileBoxTest, NeverWaitsForATile) {
   const std::shared_future<void> opened = gate.get_future().share();
   const MemoryTiles source(wide_grid(), {}, [&] { opened.wait(); });
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
-  TileBox box(source, shared, limits_for(1000, 4));
+  TileBox box(source, shared, limits_for(1000, 4), workers_);
   for (int frame = 0; frame < 10; ++frame) {
     box.update({1000.0 + 90.0 * frame, 1000.0}, 900.0);
     EXPECT_EQ(box.figures().resident_tiles, 0);
@@ -122,7 +123,7 @@ TEST_F(TileBoxTest, ShowsTheSameBytesWhateverTheRoute) {
   // After any flight, each resident tile's buffer holds that tile's codes and no other's.
   const MemoryTiles source(wide_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
-  TileBox box(source, shared, limits_for(100, 3));
+  TileBox box(source, shared, limits_for(100, 3), workers_);
   for (int step = 0; step < 40; ++step) {
     box.update({static_cast<double>(step * 977 % 3000), static_cast<double>(step * 571 % 2000)}, 300.0);
     std::this_thread::sleep_for(milliseconds(1));
@@ -148,7 +149,7 @@ std::vector<std::int16_t> shadow_of(const MemoryTiles& source, TileIndex tile, c
 TEST_F(TileBoxTest, ShadesAllTilesAnewWhenTheSunMoves) {
   const MemoryTiles source(wide_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
-  TileBox box(source, shared, limits_for(400, 4));
+  TileBox box(source, shared, limits_for(400, 4), workers_);
   for (const CastingSun& sun : {CastingSun{270.0, 2.0}, CastingSun{131.0, 6.0}}) {
     box.set_sun(sun);
     box.finish({700.0, 900.0}, 300.0);
@@ -177,7 +178,7 @@ TEST_F(TileBoxTest, KeepsOldShadowsUntilNewOnesAreThere) {
     if (closed) opened.wait();
   });
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
-  TileBox box(source, shared, limits_for(400, 4));
+  TileBox box(source, shared, limits_for(400, 4), workers_);
   box.set_sun(old_sun);
   box.finish({700.0, 900.0}, 300.0);
   closed = true;
@@ -200,7 +201,7 @@ TEST_F(TileBoxTest, NamesATileThatCastsNothingAsItCannotBeRead) {
     if (tile == TileIndex{7, 9}) throw Error(ErrorCode::kCorrupt, "tile (7,9)");
   });
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
-  TileBox box(source, shared, limits_for(400, 4));
+  TileBox box(source, shared, limits_for(400, 4), workers_);
   box.set_sun(CastingSun{});
   box.finish({700.0, 900.0}, 300.0);
   ASSERT_NE(box.resident({7, 9}), nullptr);
@@ -211,7 +212,7 @@ TEST_F(TileBoxTest, NamesATileThatCastsNothingAsItCannotBeRead) {
 TEST_F(TileBoxTest, RefusesTooLittleMemory) {
   const MemoryTiles source(wide_grid());
   const SharedGeometry shared(source.grid().shape(), make_index_arrays(source.grid().shape()));
-  EXPECT_THROW(TileBox(source, shared, limits_for(7, 1)), Error);
+  EXPECT_THROW(TileBox(source, shared, limits_for(7, 1), workers_), Error);
 }
 
 }  // namespace

@@ -9,7 +9,8 @@
 
 namespace isohf::view {
 
-PlaneBoxes::PlaneBoxes(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits)
+PlaneBoxes::PlaneBoxes(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits,
+                       Workers& workers)
     : source_(source), planes_(planes_of(source)), whole_(whole_bounds(source)) {
   boxes_.resize(static_cast<std::size_t>(planes_.count()) + 1);
   const std::uint64_t share = limits.memory_bytes / boxes_.size();
@@ -22,7 +23,7 @@ PlaneBoxes::PlaneBoxes(const TileSource& source, const SharedGeometry& shared, c
     const std::uint64_t all = (std::min<std::uint64_t>(tiles, share) + 16) * TileBox::most_bytes_of_a_tile(source);
     own.memory_bytes = plane == 0 ? left : std::min(share, all);
     left -= own.memory_bytes;
-    boxes_[static_cast<std::size_t>(plane)] = std::make_unique<TileBox>(source.plane(plane), shared, own);
+    boxes_[static_cast<std::size_t>(plane)] = std::make_unique<TileBox>(source.plane(plane), shared, own, workers);
   }
 }
 

@@ -16,7 +16,7 @@ namespace isohf::view {
 class PlaneBoxes {
  public:
   /// Throws Error{kInvalidArgument} where limits.memory_bytes are too few.
-  PlaneBoxes(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits);
+  PlaneBoxes(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits, Workers& workers);
 
   void set_sun(const std::optional<CastingSun>& sun);
   /// Once a frame. reach  distance from the eye in which anything is wanted

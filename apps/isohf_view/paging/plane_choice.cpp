@@ -15,9 +15,7 @@ class Choice {
 
   std::vector<ChosenTile> make(const TileRange& top) {
     std::vector<TileIndex> tiles;
-    for (std::int64_t row = top.first_row; row <= top.last_row; ++row) {
-      for (std::int64_t column = top.first_column; column <= top.last_column; ++column) tiles.push_back({column, row});
-    }
+    for_each_tile(top, [&](TileIndex tile) { tiles.push_back(tile); });
     std::vector<ChosenTile> chosen;
     for (int plane = planes_.count(); plane >= 0; --plane) {
       std::vector<TileIndex> below;
@@ -26,7 +24,7 @@ class Choice {
         if (!wishes_.is_stored(at)) continue;
         if (plane > 0 && gives_way(at)) {
           refined_[static_cast<std::size_t>(plane)].insert(planes_.grid(plane).flat_index(tile));
-          for_each_below(at, [&](TileIndex child) { below.push_back(child); });
+          for_each_tile(planes_.below(plane, tile), [&](TileIndex child) { below.push_back(child); });
         } else {
           chosen.push_back({at, coarser_sides(at)});
         }
@@ -37,14 +35,6 @@ class Choice {
   }
 
  private:
-  template <typename Use>
-  void for_each_below(PlaneTile at, const Use& use) const {
-    const isohf::TileRange range = planes_.below(at.plane, at.tile);
-    for (std::int64_t row = range.first.row; row < range.end.row; ++row) {
-      for (std::int64_t column = range.first.column; column < range.end.column; ++column) use(TileIndex{column, row});
-    }
-  }
-
   /// A stored tile of the plane that is covered by a coarser one.
   [[nodiscard]] bool is_coarser(int plane, TileIndex tile) const {
     const TileGrid& grid = planes_.grid(plane);
@@ -61,7 +51,7 @@ class Choice {
       }
     }
     bool ready = true;
-    for_each_below(at, [&](TileIndex child) {
+    for_each_tile(planes_.below(at.plane, at.tile), [&](TileIndex child) {
       const PlaneTile below{at.plane - 1, child};
       ready = ready && (!wishes_.is_stored(below) || wishes_.is_resident(below));
     });

@@ -15,13 +15,9 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr float kDepthSteps = 32767.0F;
 
 TileRange range_of(const std::vector<TileIndex>& tiles) {
-  TileRange range{tiles.front().column, tiles.front().column, tiles.front().row, tiles.front().row};
-  for (const TileIndex tile : tiles) {
-    range.first_column = std::min(range.first_column, tile.column);
-    range.last_column = std::max(range.last_column, tile.column);
-    range.first_row = std::min(range.first_row, tile.row);
-    range.last_row = std::max(range.last_row, tile.row);
-  }
+  const auto alone = [](TileIndex tile) { return TileRange{tile, {tile.column + 1, tile.row + 1}}; };
+  TileRange range = alone(tiles.front());
+  for (const TileIndex tile : tiles) range = around(range, alone(tile));
   return range;
 }
 
@@ -35,12 +31,10 @@ SweptSun swept(const TileSource& source, const CastingSun& sun) {
 /// Lowest elevation of the stored tiles of a range; infinite where there are none.
 double lowest(const TileSource& source, const TileRange& range) {
   double low = std::numeric_limits<double>::infinity();
-  for (std::int64_t row = range.first_row; row <= range.last_row; ++row) {
-    for (std::int64_t column = range.first_column; column <= range.last_column; ++column) {
-      const TileBounds bounds = source.bounds({column, row});
-      if (bounds.stored) low = std::min(low, bounds.low);
-    }
-  }
+  for_each_tile(range, [&](TileIndex tile) {
+    const TileBounds bounds = source.bounds(tile);
+    if (bounds.stored) low = std::min(low, bounds.low);
+  });
   return low;
 }
 
@@ -63,13 +57,13 @@ TileRange casting_range(const TileSource& source, const CastingSun& sun, const T
     TileRange range = shaded;
     // On its other side the last lane lies between two lines.
     const std::int64_t other = x > 0 && z > 0 ? 1 : 0;
-    range.first_column = std::max<std::int64_t>(0, shaded.first_column - (towards_x < 0.0 ? x : other));
-    range.last_column = std::min(grid.tile_columns() - 1, shaded.last_column + (towards_x > 0.0 ? x : other));
-    if (towards_z < 0.0) range.first_row = std::max<std::int64_t>(0, shaded.first_row - z);
-    if (towards_z > 0.0) range.last_row = std::min(grid.tile_rows() - 1, shaded.last_row + z);
-    const std::int64_t columns = range.last_column - range.first_column + 1;
-    const std::int64_t count = columns * (range.last_row - range.first_row + 1);
-    if ((count <= limits.tiles && columns <= limits.columns) || reach < 1e-3 * grid.extent_x()) {
+    range.first.column -= towards_x < 0.0 ? x : other;
+    range.end.column += towards_x > 0.0 ? x : other;
+    if (towards_z < 0.0) range.first.row -= z;
+    if (towards_z > 0.0) range.end.row += z;
+    range = intersection(range, {{0, 0}, {grid.tile_columns(), grid.tile_rows()}});
+    const bool fits = range.count() <= limits.tiles && range.end.column - range.first.column <= limits.columns;
+    if (fits || reach < 1e-3 * grid.extent_x()) {
       return range;
     }
   }
@@ -90,8 +84,8 @@ class RangeSweep {
         hidden_(box_, std::nullopt) {
     const TileGrid& grid = source.grid();
     // Lines of light lie where a sweep over all tiles would have them, so that shadows go on from one range to the next.
-    sweep_.begin_behind(range.first_column, grid.tile_columns() - 1 - range.last_column,
-                        sweep_.from_south() ? grid.tile_rows() - 1 - range.last_row : range.first_row);
+    sweep_.begin_behind(range.first.column, grid.tile_columns() - range.end.column,
+                        sweep_.from_south() ? grid.tile_rows() - range.end.row : range.first.row);
   }
 
   /// Appends the shadows of those of the tiles that lie in the range.
@@ -99,12 +93,12 @@ class RangeSweep {
             std::string& unread, std::vector<TileShadow>& shadows);
 
  private:
-  [[nodiscard]] std::int64_t columns() const { return range_.last_column - range_.first_column + 1; }
-  [[nodiscard]] std::int64_t rows() const { return range_.last_row - range_.first_row + 1; }
+  [[nodiscard]] std::int64_t columns() const { return range_.end.column - range_.first.column; }
+  [[nodiscard]] std::int64_t rows() const { return range_.end.row - range_.first.row; }
   [[nodiscard]] WorldBounds covered() const {
     const WorldBounds all = source_.covered();
-    const double x = static_cast<double>(range_.first_column) * box_.extent_x();
-    const double z = static_cast<double>(range_.first_row) * box_.extent_z();
+    const double x = static_cast<double>(range_.first.column) * box_.extent_x();
+    const double z = static_cast<double>(range_.first.row) * box_.extent_z();
     return {all.x0 - x, all.z0 - z, all.x1 - x, all.z1 - z};
   }
 
@@ -125,7 +119,7 @@ void RangeSweep::cast(const std::vector<TileIndex>& tiles, bool from_seeds, cons
   for (std::int64_t k = 0; k < rows() && !cancelled; ++k) {
     const std::int64_t row = sweep_.from_south() ? rows() - 1 - k : k;
     for (std::int64_t column = 0; column < columns(); ++column) {
-      const TileIndex at{range_.first_column + column, range_.first_row + row};
+      const TileIndex at{range_.first.column + column, range_.first.row + row};
       std::fill(read.begin(), read.end(), std::numeric_limits<float>::quiet_NaN());
       try {
         if (from_seeds) {
@@ -138,12 +132,12 @@ void RangeSweep::cast(const std::vector<TileIndex>& tiles, bool from_seeds, cons
       }
       heights_.write_tile(column, read);
     }
-    const auto lies_here = [&](TileIndex tile) { return tile.row == range_.first_row + row && range_.contains(tile); };
+    const auto lies_here = [&](TileIndex tile) { return tile.row == range_.first.row + row && range_.contains(tile); };
     const bool wanted = std::any_of(tiles.begin(), tiles.end(), lies_here);
     light = sweep_.pass(row, light, heights_, wanted ? &hidden_ : nullptr);
     for (const TileIndex shaded : tiles) {
       if (!lies_here(shaded)) continue;
-      const std::vector<float> found = hidden_.tile(shaded.column - range_.first_column);
+      const std::vector<float> found = hidden_.tile(shaded.column - range_.first.column);
       TileShadow shadow{shaded, std::vector<std::int16_t>(vertices), gain};
       std::transform(found.begin(), found.end(), shadow.depths.begin(), [gain](float part) {
         return static_cast<std::int16_t>(std::lround(std::clamp(part * kDepthSteps / gain, -kDepthSteps, kDepthSteps)));

@@ -3,31 +3,17 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "gl/gl_objects.h"
 #include "paging/background_loader.h"
-#include "paging/tile_box.h"
 #include "paging/tile_source.h"
 #include "view_state.h"
 
 namespace isohf::view {
-
-/// A tile's texture from the mip level `finest` on.
-struct TextureRequest {
-  TileIndex tile{};
-  int finest = 0;
-};
-
-/// The same as a worker has decoded it.
-struct TextureChain {
-  TextureRequest request;
-  std::vector<Picture> levels;  ///< RGBA, colours multiplied by alpha; empty where reading failed
-  std::string error;
-};
 
 /// A level of a tile's texture as it is drawn: RGBA, colours multiplied by alpha, so that texels without colour lend
 /// none to their neighbours when the GPU filters. Throws as TileSource::read_texture.
@@ -42,16 +28,16 @@ struct TextureBoxFigures {
 };
 
 /// The textures of the tiles around the camera (docs/decisions/0015), each from the mip level on that its distance asks
-/// for: one whose texels are no larger than pixels. A tile gets its coarse levels first, a few kilobytes, and the fine
-/// ones when they are ready. Where memory does not hold what is wanted all tiles get coarser ones. Workers decode;
-/// update() uploads within the frame's budget, row by row if need be, and never waits. Lives on the GL thread.
+/// for: one whose texels are no larger than pixels. Where memory does not hold what is wanted all tiles get coarser ones.
+/// Workers decode; update() uploads what is ready, a texture a frame or as many as the frame's budget holds, and never
+/// waits. Lives on the GL thread.
 class TextureBox {
  public:
   /// The source has textures. Throws Error{kInvalidArgument} where memory_bytes does not hold a coarsest level on its
   /// way.
-  TextureBox(const TileSource& source, std::uint64_t memory_bytes, int workers);
+  TextureBox(const TileSource& source, std::uint64_t memory_bytes, Workers& workers);
 
-  /// Once a frame: keeps the textures of the tiles in `range` as the view wants them. At least a row of texels goes up.
+  /// Once a frame: keeps the textures of the tiles in `range` as the view wants them.
   void update(const TileRange& range, const ViewState& view, std::uint64_t upload_bytes);
   /// Updates until all is there that is wanted: for pictures, not for frames.
   void finish(
@@ -63,10 +49,17 @@ class TextureBox {
   /// The first texture that could not be read, as a message.
   [[nodiscard]] const std::optional<std::string>& error() const { return error_; }
 
-  /// Bytes of a texture on the GPU from `level` on, RGBA.
-  [[nodiscard]] std::uint64_t bytes_from(int level) const;
-
  private:
+  struct Request {
+    TileIndex tile{};
+    int finest = 0;
+  };
+  /// As a worker has decoded it; no levels where reading failed.
+  struct Chain {
+    Request request;
+    std::vector<Picture> levels;
+    std::string error;
+  };
   struct Entry {
     TileIndex tile{};
     std::optional<Texture> texture;
@@ -76,42 +69,31 @@ class TextureBox {
     int wanted = 0;  ///< the number of levels: none
     double distance = 0.0;
   };
-  /// A texture that goes up row by row.
-  struct Upload {
-    TextureChain chain;
-    Texture texture;
-    std::size_t level = 0;
-    int row = 0;
-  };
 
+  [[nodiscard]] static Chain load(const TileSource& source, const Request& request);
+  /// Bytes of a texture on the GPU from `level` on, RGBA; 0 beyond the last.
+  [[nodiscard]] std::uint64_t bytes_from(int level) const;
+  [[nodiscard]] bool is_due(const Entry& entry) const {
+    return !entry.broken && entry.wanted < levels_ && (!entry.texture || entry.finest > entry.wanted);
+  }
   void enter(const TileRange& range);
   void decide(const ViewState& view);
   void upload(std::uint64_t budget);
-  /// True when all of it is there.
-  bool upload_rows(Upload& work, std::uint64_t budget);
-  void take(Upload& done);
   void request();
-  bool request(Entry& entry, int finest);
-  [[nodiscard]] static bool nearer(const Entry* a, const Entry* b);
-  [[nodiscard]] bool fits(int finest) const;
-  bool evict_one();
-  void count();
+  void release(Entry& entry);
 
   const TileSource& source_;
   int levels_;
-  int finest_;  ///< finer levels are too large for the memory that there is
-  int coarse_;  ///< the level that a tile begins with
+  int finest_ = 0;  ///< finer levels are too large for the memory that there is
   float anisotropy_;
-  std::uint64_t resident_limit_;
-  std::uint64_t on_the_way_limit_;
+  std::uint64_t memory_bytes_;
   std::uint64_t resident_bytes_ = 0;    ///< on the GPU
-  std::uint64_t on_the_way_bytes_ = 0;  ///< of requests that are not yet resident, on the GPU in the end
-  std::unordered_map<std::int64_t, Entry> entries_;
-  std::deque<TextureChain> waiting_;
-  std::optional<Upload> upload_;
+  std::uint64_t on_the_way_bytes_ = 0;  ///< of requests, until they are resident
+  std::map<std::int64_t, Entry> entries_;
+  std::deque<Chain> waiting_;
   TextureBoxFigures figures_;
   std::optional<std::string> error_;
-  BackgroundLoader<TextureRequest, TextureChain> loader_;  // last: its threads stop first
+  BackgroundLoader<Request, Chain> loader_;  // last: it stops first
 };
 
 }  // namespace isohf::view

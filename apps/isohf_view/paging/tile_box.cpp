@@ -6,25 +6,27 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
+#include <iterator>
 #include <thread>
+#include <utility>
 
 #include "isohf/error.h"
 
 namespace isohf::view {
 namespace {
 
-/// What a tile takes on the CPU while it is decoded and waits, in arrays of its codes: the codes twice over, the
-/// inflated payload, and room for what zlib needs.
-constexpr std::uint64_t kCpuCopies = 4;
-/// What light that is swept over a tile takes: heights and depths, floats.
-constexpr std::uint64_t kSweptBytes = 8;
+/// Bytes of a vertex on the CPU: while its tile is decoded and waits (codes twice over, the inflated payload and room for
+/// zlib), or while light is swept over it (its height and what is hidden).
+constexpr std::uint64_t kAtWork = 8;
 
 std::uint64_t vertices_of(const TileSource& source) {
   return static_cast<std::uint64_t>(source.grid().shape().stored_vertex_count());
 }
 
-LoadedTile load_tile(const TileSource& source, TileIndex tile) {
-  LoadedTile loaded{tile, std::vector<std::uint16_t>(vertices_of(source)), {}};
+}  // namespace
+
+TileBox::Loaded TileBox::load(const TileSource& source, TileIndex tile) {
+  Loaded loaded{tile, std::vector<std::uint16_t>(vertices_of(source)), {}};
   try {
     source.read(tile, loaded.codes);
   } catch (const std::exception& error) {
@@ -34,35 +36,29 @@ LoadedTile load_tile(const TileSource& source, TileIndex tile) {
   return loaded;
 }
 
-CastShadows cast(const TileSource& source, const ShadowRequest& request, const std::atomic<bool>& leaves) {
-  CastShadows cast{{}, request.sun_number, {}};
+TileBox::Sweep TileBox::cast(Sweep sweep) const {
   try {
-    cast.shadows = cast_shadows(source, request.sun, request.tiles, request.limits, leaves, cast.error);
+    sweep.shadows = cast_shadows(source_, sweep.sun, sweep.tiles, sweep.limits, leaves_, sweep.error);
   } catch (const std::exception& error) {
-    cast.error = error.what();
+    sweep.error = error.what();
   }
-  return cast;
+  return sweep;
 }
 
-}  // namespace
-
-TileBox::TileBox(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits)
+TileBox::TileBox(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits, Workers& workers)
     : source_(source),
       shared_(shared),
       limits_(limits),
       slot_bytes_(TileSlot::bytes(shared.shape(), true)),
-      on_the_way_bytes_(TileSlot::bytes(shared.shape()) * kCpuCopies),
       depth_bytes_(vertices_of(source) * sizeof(std::int16_t)),
-      loader_([&source](TileIndex tile) { return load_tile(source, tile); }, limits.workers),
-      caster_([this](const ShadowRequest& request) { return cast(source_, request, leaves_); }, 1) {
-  const std::uint64_t per_frame = limits.upload_bytes_per_frame / slot_bytes_ + 1;
+      at_work_bytes_(vertices_of(source) * kAtWork),
+      loader_([&source](TileIndex tile) { return load(source, tile); }, workers),
+      caster_([this](const Sweep& sweep) { return cast(sweep); }, workers) {
   // A quarter of the memory at most is for tiles on their way.
-  in_flight_limit_ = static_cast<std::size_t>(
-      std::max<std::uint64_t>(1, std::min<std::uint64_t>(per_frame + 2 * static_cast<std::uint64_t>(limits.workers),
-                                                         limits.memory_bytes / 4 / on_the_way_bytes_)));
-  const std::uint64_t on_the_way = in_flight_limit_ * on_the_way_bytes_;
-  bytes_for_slots_ = limits.memory_bytes - std::min(limits.memory_bytes, on_the_way);
-  if (!fits(2, 2)) {
+  const std::uint64_t per_frame = limits.upload_bytes_per_frame / slot_bytes_ + 1;
+  in_flight_limit_ = static_cast<std::size_t>(std::clamp<std::uint64_t>(
+      per_frame + 2 * workers.count(), 1, std::max<std::uint64_t>(1, limits.memory_bytes / 4 / at_work_bytes_)));
+  if (!fits({2, 2})) {
     throw Error(
         ErrorCode::kInvalidArgument,
         fmt::format("--memory: {} MiB of it are left for tiles; four of them with their shadows, and those on their "
@@ -71,10 +67,16 @@ TileBox::TileBox(const TileSource& source, const SharedGeometry& shared, const T
   }
 }
 
-std::uint64_t TileBox::bytes_of(std::int64_t columns, std::int64_t rows) const {
-  const auto slots = static_cast<std::uint64_t>(columns * rows);
-  const auto swept = static_cast<std::uint64_t>(swept_columns(columns));
-  return slots * (slot_bytes_ + depth_bytes_) + swept * vertices_of(source_) * kSweptBytes;
+bool TileBox::fits(TileIndex across) const {
+  const auto slots = static_cast<std::uint64_t>(across.column * across.row);
+  const std::uint64_t at_work = static_cast<std::uint64_t>(swept_columns(across.column)) + in_flight_limit_;
+  return slots * (slot_bytes_ + depth_bytes_) + at_work * at_work_bytes_ <= limits_.memory_bytes;
+}
+
+std::uint64_t TileBox::most_bytes_of_a_tile(const TileSource& source) {
+  // Each may be a column that is swept. A quarter of the memory is for tiles on their way.
+  return (TileSlot::bytes(source.grid().shape(), true) + vertices_of(source) * (sizeof(std::int16_t) + 3 * kAtWork)) *
+         4 / 3;
 }
 
 void TileBox::set_sun(const std::optional<CastingSun>& sun) {
@@ -83,11 +85,7 @@ void TileBox::set_sun(const std::optional<CastingSun>& sun) {
   if (sun_) ++sun_number_;
 }
 
-std::size_t TileBox::cell_of(TileIndex tile) const {
-  return static_cast<std::size_t>(tile.column % box_columns_ + tile.row % box_rows_ * box_columns_);
-}
-
-std::pair<std::int64_t, std::int64_t> TileBox::tiles_across(double radius) const {
+TileIndex TileBox::tiles_across(double radius) const {
   const TileGrid& grid = source_.grid();
   const auto count_for = [radius](double extent, std::int64_t all) {
     const double needed = std::floor(2.0 * radius / extent) + 2.0;
@@ -98,77 +96,55 @@ std::pair<std::int64_t, std::int64_t> TileBox::tiles_across(double radius) const
 
 double TileBox::fitting_radius(double radius) const {
   const double least = 1e-6 * source_.grid().extent_x();
-  for (;; radius *= 0.98) {
-    const auto [columns, rows] = tiles_across(radius);
-    if (fits(columns, rows) || radius < least) return radius;
-  }
+  while (!fits(tiles_across(radius)) && radius >= least) radius *= 0.98;
+  return radius;
 }
 
-void TileBox::resize(WorldPoint centre, double radius) {
+/// A box that memory does not hold shrinks to one that it does; figures say so.
+void TileBox::move(WorldPoint centre, double radius) {
   const TileGrid& grid = source_.grid();
-  // A box that memory does not hold shrinks to one that it does; figures say so.
-  const double kept = fitting_radius(radius);
-  const auto [columns, rows] = tiles_across(kept);
-  figures_.radius = kept;
-  if (columns != box_columns_ || rows != box_rows_) {
-    // Rehouse what is resident and still fits.
-    std::vector<Cell> old = std::move(cells_);
-    box_columns_ = columns;
-    box_rows_ = rows;
-    cells_ = std::vector<Cell>(static_cast<std::size_t>(columns * rows));
-    for (Cell& cell : old) {
-      if (cell.state == State::kUnused) continue;
-      Cell& home = cells_[cell_of(cell.tile)];
-      if (home.state == State::kUnused) {
-        home = std::move(cell);
-      } else if (cell.slot) {
-        spare_.push_back(std::move(cell.slot));
-      }
-    }
-  }
-  const auto first = [](double place, double r, double extent, std::int64_t count, std::int64_t all) {
+  figures_.radius = fitting_radius(radius);
+  const TileIndex across = tiles_across(figures_.radius);
+  const auto first = [&](double place, double extent, std::int64_t count, std::int64_t all) {
     return static_cast<std::int64_t>(
-        std::clamp(std::floor((place - r) / extent), 0.0, static_cast<double>(all - count)));
+        std::clamp(std::floor((place - figures_.radius) / extent), 0.0, static_cast<double>(all - count)));
   };
-  range_.first_column = first(centre.x, kept, grid.extent_x(), columns, grid.tile_columns());
-  range_.first_row = first(centre.z, kept, grid.extent_z(), rows, grid.tile_rows());
-  range_.last_column = range_.first_column + columns - 1;
-  range_.last_row = range_.first_row + rows - 1;
+  range_.first = {first(centre.x, grid.extent_x(), across.column, grid.tile_columns()),
+                  first(centre.z, grid.extent_z(), across.row, grid.tile_rows())};
+  range_.end = {range_.first.column + across.column, range_.first.row + across.row};
+  for (auto at = cells_.begin(); at != cells_.end();) {
+    Cell& cell = at->second;
+    const bool stays = range_.contains(cell.tile);
+    if (!stays && cell.slot) spare_.push_back(std::move(cell.slot));
+    at = stays ? std::next(at) : cells_.erase(at);
+  }
+  for_each_tile(range_, [&](TileIndex tile) {
+    if (cells_.contains(grid.flat_index(tile))) return;
+    const State state = source_.bounds(tile).stored ? State::kMissing : State::kVoid;
+    cells_.emplace(grid.flat_index(tile), Cell{tile, state, nullptr, 0});
+  });
+  // A smaller box gives buffers back.
+  std::size_t free = cells_.size();
+  for (const auto& [flat, cell] : cells_) free -= cell.slot ? 1 : 0;
+  if (spare_.size() > free) spare_.resize(free);
 }
 
-void TileBox::enter(Cell& cell, TileIndex tile) {
-  if (cell.slot) spare_.push_back(std::move(cell.slot));
-  cell.tile = tile;
-  cell.state = source_.bounds(tile).stored ? State::kMissing : State::kVoid;
+TileBox::Cell* TileBox::find(TileIndex tile) {
+  const auto found = range_.contains(tile) ? cells_.find(source_.grid().flat_index(tile)) : cells_.end();
+  return found != cells_.end() ? &found->second : nullptr;
 }
 
 void TileBox::update(WorldPoint centre, double radius, bool shades) {
   figures_.upload_bytes = 0;
-  resize(centre, radius);
-  for (std::int64_t row = range_.first_row; row <= range_.last_row; ++row) {
-    for (std::int64_t column = range_.first_column; column <= range_.last_column; ++column) {
-      Cell& cell = cells_[cell_of({column, row})];
-      if (!(cell.tile == TileIndex{column, row})) enter(cell, {column, row});
-    }
-  }
-  loader_.collect(waiting_);
+  move(centre, radius);
   upload();
   request(centre);
   count();
   if (shades || figures_.missing_tiles == 0) request_shadows();
 }
 
-std::uint64_t TileBox::most_bytes_of_a_tile(const TileSource& source) {
-  const TileShape& shape = source.grid().shape();
-  // A quarter of the memory is for tiles on their way. Each may be a column that is swept.
-  return (TileSlot::bytes(shape, true) + TileSlot::bytes(shape) * kCpuCopies +
-          vertices_of(source) * (sizeof(std::int16_t) + 2 * kSweptBytes)) *
-         4 / 3;
-}
-
 void TileBox::rest() {
   figures_.upload_bytes = 0;
-  loader_.collect(waiting_);
   upload();
   count();
   figures_.missing_tiles = 0;
@@ -176,69 +152,62 @@ void TileBox::rest() {
 }
 
 void TileBox::upload() {
+  loader_.collect(waiting_);
   for (; !waiting_.empty(); waiting_.pop_front()) {
-    const std::uint64_t next = waiting_.front().codes.size() * sizeof(std::uint16_t);
-    if (figures_.upload_bytes > 0 && figures_.upload_bytes + next > limits_.upload_bytes_per_frame) return;
+    if (!has_room(waiting_.front().codes.size() * sizeof(std::uint16_t))) return;
     place(waiting_.front());
   }
-  upload_shadows();
-}
-
-void TileBox::upload_shadows() {
-  caster_.collect(cast_);
-  for (; !cast_.empty(); cast_.pop_front()) {
-    CastShadows& cast = cast_.front();
-    if (!error_ && !cast.error.empty()) error_ = cast.error;
-    for (; !cast.shadows.empty(); cast.shadows.pop_back()) {
-      if (figures_.upload_bytes > 0 && figures_.upload_bytes + depth_bytes_ > limits_.upload_bytes_per_frame) return;
-      const TileShadow& shadow = cast.shadows.back();
-      if (!range_.contains(shadow.tile)) continue;  // the box has moved on
-      Cell& cell = cells_[cell_of(shadow.tile)];
-      if (!(cell.tile == shadow.tile) || cell.state != State::kResident) continue;
-      cell.slot->upload_shadow(shadow.depths, shadow.gain);
-      cell.sun_number = cast.sun_number;
-      figures_.upload_bytes += depth_bytes_;
+  caster_.collect(swept_);
+  for (; !swept_.empty(); swept_.pop_front()) {
+    Sweep& sweep = swept_.front();
+    if (!error_ && !sweep.error.empty()) error_ = sweep.error;
+    for (; !sweep.shadows.empty(); sweep.shadows.pop_back()) {
+      if (!has_room(depth_bytes_)) return;
+      place(sweep.shadows.back(), sweep.sun_number);
     }
   }
   if (caster_.in_flight() == 0) sweep_bytes_ = 0;
 }
 
-void TileBox::place(LoadedTile& loaded) {
-  if (!range_.contains(loaded.tile)) return;  // the box has moved on
-  Cell& cell = cells_[cell_of(loaded.tile)];
-  if (!(cell.tile == loaded.tile)) return;
+void TileBox::place(const TileShadow& shadow, std::uint64_t sun_number) {
+  Cell* const cell = find(shadow.tile);
+  if (cell == nullptr || cell->state != State::kResident) return;  // the box has moved on
+  cell->slot->upload_shadow(shadow.depths, shadow.gain);
+  cell->sun_number = sun_number;
+  figures_.upload_bytes += depth_bytes_;
+}
+
+void TileBox::place(Loaded& loaded) {
+  Cell* const cell = find(loaded.tile);
+  if (cell == nullptr) return;  // the box has moved on
   if (!error_ && !loaded.error.empty()) error_ = loaded.error;
-  if (cell.state != State::kRequested && cell.state != State::kMissing) return;
+  if (cell->state != State::kRequested && cell->state != State::kMissing) return;
   if (loaded.codes.empty()) {
-    cell.state = State::kBroken;
+    cell->state = State::kBroken;
     return;
   }
   if (spare_.empty()) {
-    cell.slot = std::make_unique<TileSlot>(shared_);
+    cell->slot = std::make_unique<TileSlot>(shared_);
   } else {
-    cell.slot = std::move(spare_.back());
+    cell->slot = std::move(spare_.back());
     spare_.pop_back();
   }
-  cell.slot->upload(loaded.codes);
-  cell.sun_number = 0;
-  cell.state = State::kResident;
+  cell->slot->upload(loaded.codes);
+  cell->sun_number = 0;
+  cell->state = State::kResident;
   figures_.upload_bytes += loaded.codes.size() * sizeof(std::uint16_t);
-}
-
-double TileBox::distance_squared(const Cell& cell, WorldPoint centre) const {
-  const TileGrid& grid = source_.grid();
-  const double x = (static_cast<double>(cell.tile.column) + 0.5) * grid.extent_x() - centre.x;
-  const double z = (static_cast<double>(cell.tile.row) + 0.5) * grid.extent_z() - centre.z;
-  return x * x + z * z;
 }
 
 void TileBox::request(WorldPoint centre) {
   const std::size_t busy = loader_.in_flight() + waiting_.size();
   if (busy >= in_flight_limit_) return;
-  std::vector<std::pair<double, Cell*>> missing;
-  for (Cell& cell : cells_) {
+  const TileGrid& grid = source_.grid();
+  std::vector<std::pair<double, Cell*>> missing;  // by the square of their distance
+  for (auto& [flat, cell] : cells_) {
     if (cell.state != State::kMissing) continue;
-    missing.emplace_back(distance_squared(cell, centre), &cell);
+    const double x = (static_cast<double>(cell.tile.column) + 0.5) * grid.extent_x() - centre.x;
+    const double z = (static_cast<double>(cell.tile.row) + 0.5) * grid.extent_z() - centre.z;
+    missing.emplace_back(x * x + z * z, &cell);
   }
   const std::size_t wanted = std::min(missing.size(), in_flight_limit_ - busy);
   std::partial_sort(missing.begin(), missing.begin() + static_cast<std::ptrdiff_t>(wanted), missing.end(),
@@ -250,17 +219,16 @@ void TileBox::request(WorldPoint centre) {
 }
 
 void TileBox::request_shadows() {
-  if (!sun_ || caster_.in_flight() > 0 || !cast_.empty()) return;
-  ShadowRequest request{{}, *sun_, sun_number_, {}};
-  for (const Cell& cell : cells_) {
-    if (is_outdated(cell)) request.tiles.push_back(cell.tile);
+  if (!sun_ || caster_.in_flight() > 0 || !swept_.empty()) return;
+  Sweep sweep{{}, *sun_, sun_number_, {}, {}, {}};
+  for (const auto& [flat, cell] : cells_) {
+    if (is_outdated(cell)) sweep.tiles.push_back(cell.tile);
   }
-  if (request.tiles.empty()) return;
-  request.limits.tiles += static_cast<std::int64_t>(cells_.size());
-  request.limits.columns = swept_columns(box_columns_);
-  sweep_bytes_ = request.tiles.size() * depth_bytes_ +
-                 static_cast<std::uint64_t>(request.limits.columns) * vertices_of(source_) * kSweptBytes;
-  caster_.request(request);
+  if (sweep.tiles.empty()) return;
+  sweep.limits.tiles += range_.count();
+  sweep.limits.columns = swept_columns(range_.end.column - range_.first.column);
+  sweep_bytes_ = sweep.tiles.size() * depth_bytes_ + static_cast<std::uint64_t>(sweep.limits.columns) * at_work_bytes_;
+  caster_.request(sweep);
 }
 
 void TileBox::count() {
@@ -268,14 +236,14 @@ void TileBox::count() {
   figures_.missing_tiles = 0;
   figures_.shadows_to_come = 0;
   std::uint64_t slots = spare_.size();
-  for (const Cell& cell : cells_) {
+  for (const auto& [flat, cell] : cells_) {
     if (cell.slot) ++slots;
     if (cell.state == State::kResident) ++figures_.resident_tiles;
     if (is_outdated(cell)) ++figures_.shadows_to_come;
     if (cell.state == State::kMissing || cell.state == State::kRequested) ++figures_.missing_tiles;
   }
   figures_.resident_bytes =
-      slot_bytes_ * slots + on_the_way_bytes_ * (loader_.in_flight() + waiting_.size()) + sweep_bytes_;
+      slot_bytes_ * slots + at_work_bytes_ * (loader_.in_flight() + waiting_.size()) + sweep_bytes_;
 }
 
 void TileBox::finish(WorldPoint centre, double radius, const std::function<void()>& poll) {
@@ -288,9 +256,8 @@ void TileBox::finish(WorldPoint centre, double radius, const std::function<void(
 }
 
 const TileSlot* TileBox::resident(TileIndex tile) const {
-  if (!range_.contains(tile)) return nullptr;
-  const Cell& cell = cells_[cell_of(tile)];
-  return cell.tile == tile && cell.state == State::kResident ? cell.slot.get() : nullptr;
+  const auto found = range_.contains(tile) ? cells_.find(source_.grid().flat_index(tile)) : cells_.end();
+  return found != cells_.end() && found->second.state == State::kResident ? found->second.slot.get() : nullptr;
 }
 
 }  // namespace isohf::view

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "gl/tile_buffers.h"
@@ -17,32 +17,11 @@
 
 namespace isohf::view {
 
-/// A tile that a worker has decoded, or what went wrong.
-struct LoadedTile {
-  TileIndex tile{};
-  std::vector<std::uint16_t> codes;  ///< empty where reading failed
-  std::string error;
-};
-
-/// Tiles that a worker is to shade, and what it has found.
-struct ShadowRequest {
-  std::vector<TileIndex> tiles;
-  CastingSun sun;
-  std::uint64_t sun_number = 0;  ///< handed back
-  CastingLimits limits;
-};
-struct CastShadows {
-  std::vector<TileShadow> shadows;
-  std::uint64_t sun_number = 0;
-  std::string error;
-};
-
 /// Bounds that a TileBox keeps.
 struct TileBoxLimits {
   std::uint64_t memory_bytes = std::uint64_t{512} << 20;          ///< tiles on the GPU and on their way there
   std::uint64_t upload_bytes_per_frame = std::uint64_t{4} << 20;  ///< at least one tile a frame goes up all the same
-  int workers = 2;
-  std::uint64_t enough_mib = 0;  ///< of --memory: what a refusal names
+  std::uint64_t enough_mib = 0;                                   ///< of --memory: what a refusal names
 };
 
 /// What one update did, and where things stand.
@@ -55,16 +34,14 @@ struct TileBoxFigures {
   double radius = 0.0;               ///< world units: what was asked for, or less where memory would not do
 };
 
-/// The tiles around the camera, kept resident by sliding a box over the heightfield (paper section 3.12).
-///
-/// Tile (c, r) lives in cell (c mod box columns, r mod box rows), so that rows and columns that leave the box hand
-/// their cells, and GPU buffers, to those that enter on the other side. Workers decode; update() uploads what they have
-/// finished, within the frame's budget, and never waits for them. Another one sweeps light over the tiles whose shadows are
-/// not those of the sun, and those that may cast on them; until then the old ones stay. A TileBox lives on the GL thread.
+/// The tiles around the camera, kept resident by sliding a box over the heightfield (paper section 3.12): tiles that leave
+/// it hand their GPU buffers to those that enter. Workers decode; update() uploads what they have finished, within the
+/// frame's budget, and never waits for them. One sweeps light over the tiles whose shadows are not those of the sun, and
+/// those that may cast on them; until then the old ones stay. A TileBox lives on the GL thread.
 class TileBox {
  public:
   /// Throws Error{kInvalidArgument} where memory_bytes does not hold four tiles.
-  TileBox(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits);
+  TileBox(const TileSource& source, const SharedGeometry& shared, const TileBoxLimits& limits, Workers& workers);
   ~TileBox() { leaves_ = true; }
   TileBox(const TileBox&) = delete;
   TileBox& operator=(const TileBox&) = delete;
@@ -92,25 +69,45 @@ class TileBox {
   [[nodiscard]] const TileBoxFigures& figures() const { return figures_; }
   /// The first tile that could not be read, as a message.
   [[nodiscard]] const std::optional<std::string>& error() const { return error_; }
-  [[nodiscard]] const TileSource& source() const { return source_; }
 
  private:
-  enum class State { kUnused, kMissing, kRequested, kResident, kVoid, kBroken };
+  enum class State { kMissing, kRequested, kResident, kVoid, kBroken };
   struct Cell {
-    TileIndex tile{-1, -1};
-    State state = State::kUnused;
+    TileIndex tile;
+    State state;
     std::unique_ptr<TileSlot> slot;
     std::uint64_t sun_number = 0;  ///< of the sun that its shadow is of; 0: it has none
   };
+  /// A tile that a worker has decoded; no codes where reading failed.
+  struct Loaded {
+    TileIndex tile{};
+    std::vector<std::uint16_t> codes;
+    std::string error;
+  };
+  /// Tiles that a worker shades, and what it has found.
+  struct Sweep {
+    std::vector<TileIndex> tiles;
+    CastingSun sun;
+    std::uint64_t sun_number = 0;
+    CastingLimits limits;
+    std::vector<TileShadow> shadows;
+    std::string error;
+  };
 
+  [[nodiscard]] static Loaded load(const TileSource& source, TileIndex tile);
+  [[nodiscard]] Sweep cast(Sweep sweep) const;
   void update(WorldPoint centre, double radius, bool shades);
-  [[nodiscard]] std::size_t cell_of(TileIndex tile) const;
-  [[nodiscard]] std::pair<std::int64_t, std::int64_t> tiles_across(double radius) const;
-  void resize(WorldPoint centre, double radius);
-  void enter(Cell& cell, TileIndex tile);
-  void place(LoadedTile& loaded);
+  /// The range around a place that memory holds.
+  [[nodiscard]] TileIndex tiles_across(double radius) const;
+  void move(WorldPoint centre, double radius);
+  /// nullptr: not in the box.
+  [[nodiscard]] Cell* find(TileIndex tile);
   void upload();
-  void upload_shadows();
+  void place(Loaded& loaded);
+  void place(const TileShadow& shadow, std::uint64_t sun_number);
+  [[nodiscard]] bool has_room(std::uint64_t bytes) const {
+    return figures_.upload_bytes == 0 || figures_.upload_bytes + bytes <= limits_.upload_bytes_per_frame;
+  }
   [[nodiscard]] bool is_outdated(const Cell& cell) const {
     return sun_ && cell.state == State::kResident && cell.sun_number != sun_number_;
   }
@@ -118,37 +115,30 @@ class TileBox {
   void request_shadows();
   /// Tile columns that a sweep holds at most, for a box of so many.
   [[nodiscard]] static std::int64_t swept_columns(std::int64_t columns) { return 2 * columns + 8; }
-  /// What so many tiles take, with their shadows.
-  [[nodiscard]] std::uint64_t bytes_of(std::int64_t columns, std::int64_t rows) const;
-  [[nodiscard]] bool fits(std::int64_t columns, std::int64_t rows) const {
-    return bytes_of(columns, rows) <= bytes_for_slots_;
-  }
-  [[nodiscard]] double distance_squared(const Cell& cell, WorldPoint centre) const;
+  /// Whether memory holds a box of so many tiles, with their shadows.
+  [[nodiscard]] bool fits(TileIndex across) const;
   void count();
 
   const TileSource& source_;
   const SharedGeometry& shared_;
   TileBoxLimits limits_;
   std::uint64_t slot_bytes_;
-  std::uint64_t on_the_way_bytes_;  ///< of one tile
+  std::uint64_t depth_bytes_;    ///< of a tile's shadow
+  std::uint64_t at_work_bytes_;  ///< of a tile that is decoded or swept
   std::size_t in_flight_limit_;
-  std::uint64_t bytes_for_slots_;
-  std::uint64_t depth_bytes_;  ///< of a tile's shadow
-  std::int64_t box_columns_ = 0;
-  std::int64_t box_rows_ = 0;
   TileRange range_;
-  std::vector<Cell> cells_;
+  std::map<std::int64_t, Cell> cells_;
   std::vector<std::unique_ptr<TileSlot>> spare_;
-  std::deque<LoadedTile> waiting_;  ///< decoded, for a later frame's budget
-  std::deque<CastShadows> cast_;    ///< shadows for a later frame's budget
+  std::deque<Loaded> waiting_;  ///< for a later frame's budget, as is
+  std::deque<Sweep> swept_;
   std::optional<CastingSun> sun_;
   std::uint64_t sun_number_ = 0;  ///< counts suns
   TileBoxFigures figures_;
   std::optional<std::string> error_;
   std::uint64_t sweep_bytes_ = 0;  ///< of the sweep in flight, or of what it has cast
   std::atomic<bool> leaves_{false};
-  BackgroundLoader<TileIndex, LoadedTile> loader_;  // last: their threads stop first
-  BackgroundLoader<ShadowRequest, CastShadows> caster_;
+  BackgroundLoader<TileIndex, Loaded> loader_;  // last: they stop first
+  BackgroundLoader<Sweep, Sweep> caster_;
 };
 
 }  // namespace isohf::view

@@ -30,6 +30,9 @@ ArchiveReader understood(const ArchiveReader& archive) {
   return another;
 }
 
+/// Falls that are as near are the same.
+constexpr double kSameFall = 1e-9;
+
 /// The place of an archive's world; nullopt if that is not known.
 std::optional<WorldGeoreference> understood_places(const ArchiveReader& archive) {
   try {
@@ -39,42 +42,44 @@ std::optional<WorldGeoreference> understood_places(const ArchiveReader& archive)
   }
 }
 
-/// Falls that are as near are the same.
-constexpr double kSameFall = 1e-9;
+SourceFacts facts_of(const Metadata& metadata) {
+  const GroundScale ground = ground_scale(metadata);
+  const Quantisation& stored = metadata.quantisation;
+  SourceFacts facts{scaled(metadata.grid, ground),
+                    {stored.offset * ground.elevation, stored.scale * ground.elevation},
+                    scaled(metadata.valid, ground),
+                    ground};
+  if (metadata.planes.count > 0) {
+    facts.planes.emplace(facts.grid, metadata.planes.stride, metadata.planes.count, metadata.wraps_x);
+  }
+  facts.textures = texture_info(metadata);
+  return facts;
+}
 
 class ArchiveSource final : public TileSource {
  public:
-  ArchiveSource(const std::string& path, const std::string& name)
-      : reader_(name.empty() ? ArchiveReader(path) : ArchiveReader(open_file_source(path), name)),
-        ground_scale_(isohf::ground_scale(reader_.metadata())),
-        grid_(scaled(reader_.grid(), ground_scale_)),
-        world_per_elevation_(ground_scale_.elevation) {
+  explicit ArchiveSource(ArchiveReader reader) : TileSource(facts_of(reader.metadata())), reader_(std::move(reader)) {
     const Metadata& metadata = reader_.metadata();
-    if (metadata.planes.count > 0) {
-      planes_.emplace(grid_, metadata.planes.stride, metadata.planes.count, metadata.wraps_x);
-      for (int plane = 1; plane <= planes_->count(); ++plane) coarse_.push_back(std::make_unique<Coarse>(*this, plane));
+    facts_.is_to_scale = ground_unit() == "metre";
+    for (int plane = 1; facts_.planes && plane <= facts_.planes->count(); ++plane) {
+      coarse_.push_back(std::make_unique<Coarse>(*this, plane));
     }
-    const Quantisation& stored = metadata.quantisation;
-    scale_ = {stored.offset * world_per_elevation_, stored.scale * world_per_elevation_};
-    if (stored.type == CodeType::kF32) {
+    if (is_float()) {
       // Floats on the GPU would be four bytes a vertex: round them to 65535 steps over the dataset's range.
       // The statistics' leaves out what lies beyond the source.
       const TileBounds whole = whole_bounds(*this);
-      scale_ = {whole.low, whole.high > whole.low ? (whole.high - whole.low) / (kVoidCode - 1) : 1.0};
+      facts_.scale = {whole.low, whole.high > whole.low ? (whole.high - whole.low) / (kVoidCode - 1) : 1.0};
+      for (const auto& coarse : coarse_) coarse->set_scale(facts_.scale);
     }
-    if (texture_info(metadata)) textures_.emplace(reader_);
-    if (shadow_seed_info(metadata)) seeds_.emplace(reader_);
+    if (facts_.textures) textures_.emplace(reader_);
+    if (const auto info = shadow_seed_info(metadata)) {
+      seeds_.emplace(reader_);
+      const double fall = info->fall_per_half_step(metadata.grid, metadata.quantisation, info->sun_min_deg);
+      facts_.seeded_fall = (1.0 - kSameFall) * fall * (is_float() ? world_per_elevation() / scale().scale : 1.0);
+    }
   }
 
-  [[nodiscard]] const TileGrid& grid() const override { return grid_; }
-  [[nodiscard]] ViewScale scale() const override { return scale_; }
-
-  [[nodiscard]] bool is_to_scale() const override { return ground_unit() == "metre"; }
-  [[nodiscard]] GroundScale ground_scale() const override { return ground_scale_; }
-  [[nodiscard]] WorldBounds covered() const override { return scaled(reader_.metadata().valid, ground_scale_); }
-
   [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return bounds(tile, 0); }
-  [[nodiscard]] const Planes* planes() const override { return planes_ ? &*planes_ : nullptr; }
   [[nodiscard]] const TileSource& plane(int plane) const override {
     if (plane == 0) return *this;
     return *coarse_[static_cast<std::size_t>(plane) - 1];
@@ -83,13 +88,6 @@ class ArchiveSource final : public TileSource {
   void read(TileIndex tile, std::span<std::uint16_t> codes) const override { convert(reader_.read_tile(tile), codes); }
   void read_heights(TileIndex tile, std::span<float> heights) const override {
     exact_codes(reader_.read_tile(tile), heights);
-  }
-  [[nodiscard]] bool has_seeds(double fall) const override {
-    if (!seeds_) return false;
-    const ShadowSeedInfo& info = seeds_->info();
-    const double least =
-        info.fall_per_half_step(reader_.grid(), reader_.metadata().quantisation, info.sun_min_deg) * code_per_stored();
-    return fall >= least * (1.0 - kSameFall);
   }
   CasterRows read_casters(TileIndex tile, LightTravel travel, std::span<float> heights) const override {
     const TileCodes stored = reader_.read_tile(tile);
@@ -106,12 +104,13 @@ class ArchiveSource final : public TileSource {
   /// A coarse plane of the archive.
   class Coarse final : public TileSource {
    public:
-    Coarse(const ArchiveSource& whole, int plane) : whole_(whole), plane_(plane) {}
-    [[nodiscard]] const TileGrid& grid() const override { return whole_.planes_->grid(plane_); }
-    [[nodiscard]] ViewScale scale() const override { return whole_.scale(); }
-    [[nodiscard]] bool is_to_scale() const override { return whole_.is_to_scale(); }
-    [[nodiscard]] WorldBounds covered() const override { return whole_.covered(); }
+    Coarse(const ArchiveSource& whole, int plane)
+        : TileSource({whole.planes()->grid(plane), whole.scale(), whole.covered(), whole.facts_.ground_scale}),
+          whole_(whole),
+          plane_(plane) {}
+    void set_scale(ViewScale scale) { facts_.scale = scale; }
     [[nodiscard]] TileBounds bounds(TileIndex tile) const override { return whole_.bounds(tile, plane_); }
+    [[nodiscard]] const Metadata* metadata() const override { return whole_.metadata(); }
     void read(TileIndex tile, std::span<std::uint16_t> codes) const override {
       whole_.convert(whole_.reader_.read_tile(tile, plane_), codes);
     }
@@ -138,11 +137,9 @@ class ArchiveSource final : public TileSource {
     if (place.geo && std::abs(place.geo->latitude) > 90.0) place.geo.reset();
     return place;
   }
-  [[nodiscard]] double world_per_elevation() const override { return world_per_elevation_; }
   [[nodiscard]] const Metadata* metadata() const override { return &reader_.metadata(); }
   [[nodiscard]] DaySky sky() const override { return DaySky(understood(reader_)); }
 
-  [[nodiscard]] const TextureInfo* textures() const override { return textures_ ? &textures_->info() : nullptr; }
   [[nodiscard]] bool has_texture(TileIndex tile) const override { return textures_ && textures_->has(tile); }
   [[nodiscard]] Picture read_texture(TileIndex tile, int level) const override {
     return textures_->read_rgba(tile, level);
@@ -153,15 +150,12 @@ class ArchiveSource final : public TileSource {
     const TileEntry entry = reader_.tile_entry(tile, plane);
     if (!entry.stored) return {};
     if (is_float()) {
-      return {true, entry.has_voids, std::bit_cast<float>(entry.code_min) * world_per_elevation_,
-              std::bit_cast<float>(entry.code_max) * world_per_elevation_};
+      return {true, entry.has_voids, std::bit_cast<float>(entry.code_min) * world_per_elevation(),
+              std::bit_cast<float>(entry.code_max) * world_per_elevation()};
     }
-    return {true, entry.has_voids, scale_.offset + scale_.scale * entry.code_min,
-            scale_.offset + scale_.scale * entry.code_max};
+    return {true, entry.has_voids, scale().offset + scale().scale * entry.code_min,
+            scale().offset + scale().scale * entry.code_max};
   }
-
-  /// Codes here for one that is stored, or for a unit of elevations where these are.
-  [[nodiscard]] double code_per_stored() const { return is_float() ? world_per_elevation_ / scale_.scale : 1.0; }
 
   [[nodiscard]] bool is_float() const { return reader_.metadata().quantisation.type == CodeType::kF32; }
   [[nodiscard]] static std::uint16_t rounded(double code) {
@@ -180,7 +174,7 @@ class ArchiveSource final : public TileSource {
     });
   }
   [[nodiscard]] double exact_code_of(double elevation) const {
-    return (elevation * world_per_elevation_ - scale_.offset) / scale_.scale;
+    return (elevation * world_per_elevation() - scale().offset) / scale().scale;
   }
   [[nodiscard]] std::uint16_t code_of(float elevation) const { return rounded(exact_code_of(elevation)); }
 
@@ -198,15 +192,10 @@ class ArchiveSource final : public TileSource {
   }
 
   ArchiveReader reader_;
-  GroundScale ground_scale_;
-  TileGrid grid_;
-  double world_per_elevation_;
-  ViewScale scale_;
   mutable std::once_flag georeference_once_;
   mutable std::optional<WorldGeoreference> georeference_;
   std::optional<TextureReader> textures_;
   std::optional<ShadowSeedReader> seeds_;
-  std::optional<Planes> planes_;
   std::vector<std::unique_ptr<Coarse>> coarse_;
 };
 
@@ -233,15 +222,15 @@ Place TileSource::describe(WorldPoint at, double height) const {
 }
 
 WorldPoint TileSource::from_archive(WorldPoint at) const {
-  return {at.x * ground_scale().x, at.z * ground_scale().z};
+  return {at.x * facts_.ground_scale.x, at.z * facts_.ground_scale.z};
 }
 
 WorldPoint TileSource::to_archive(WorldPoint at) const {
-  return {at.x / ground_scale().x, at.z / ground_scale().z};
+  return {at.x / facts_.ground_scale.x, at.z / facts_.ground_scale.z};
 }
 
 std::string TileSource::ground_unit() const {
-  if (ground_scale().z != 1.0) return "metre";
+  if (facts_.ground_scale.z != 1.0) return "metre";
   return metadata() == nullptr || metadata()->horizontal_unit == "unknown" ? "" : metadata()->horizontal_unit;
 }
 
@@ -296,7 +285,8 @@ TileBounds whole_bounds(const TileSource& source) {
 }
 
 std::unique_ptr<TileSource> open_archive(const std::string& path, const std::string& name) {
-  return std::make_unique<ArchiveSource>(path, name);
+  return std::make_unique<ArchiveSource>(name.empty() ? ArchiveReader(path)
+                                                      : ArchiveReader(open_file_source(path), name));
 }
 
 }  // namespace isohf::view

@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "isohf/archive.h"
@@ -18,6 +19,7 @@
 #include "isohf/picture.h"
 #include "isohf/restore/ground_scale.h"
 #include "isohf/shade.h"
+#include "isohf/tile_range.h"
 #include "view_state.h"
 
 namespace isohf::view {
@@ -50,54 +52,69 @@ struct Place {
   std::optional<GeoPoint> geo;
 };
 
+/// What a source is, whatever its tiles hold.
+struct SourceFacts {
+  TileGrid grid;
+  ViewScale scale{};
+  WorldBounds covered{};           ///< the part of the world that the source covers; what lies beyond is made up
+  GroundScale ground_scale{};      ///< from the archive's world to that of all else here
+  std::optional<Planes> planes{};  ///< the coarse planes above the tiles
+  std::optional<TextureInfo> textures{};
+  /// The least that light along the rows falls in a half step, codes, where shadow seeds serve it; nullopt: there are none.
+  std::optional<double> seeded_fall{};
+  bool is_to_scale = true;  ///< false where the ground's unit is not known: heights may have any proportion to it
+};
+/// A source that covers all of the world.
+[[nodiscard]] inline SourceFacts facts_of(const TileGrid& grid, ViewScale scale) {
+  return {grid, scale, {0.0, 0.0, grid.world_width(), grid.world_height()}};
+}
+
 /// Where tiles come from. All functions may be called from any number of threads at once.
 class TileSource {
  public:
-  TileSource() = default;
+  explicit TileSource(SourceFacts facts) : facts_(std::move(facts)) {}
   TileSource(const TileSource&) = delete;
   TileSource& operator=(const TileSource&) = delete;
   virtual ~TileSource() = default;
 
-  [[nodiscard]] virtual const TileGrid& grid() const = 0;
-  [[nodiscard]] virtual ViewScale scale() const = 0;
-  /// False where the ground's unit is not known, so that heights may have any proportion to it.
-  [[nodiscard]] virtual bool is_to_scale() const { return true; }
-  /// The part of the world that the source covers; what lies beyond is made up.
-  [[nodiscard]] virtual WorldBounds covered() const { return {0.0, 0.0, grid().world_width(), grid().world_height()}; }
   [[nodiscard]] virtual TileBounds bounds(TileIndex tile) const = 0;
   /// codes [C x R] out, 0..65534, or kVoidCode. Throws Error naming the tile.
   virtual void read(TileIndex tile, std::span<std::uint16_t> codes) const = 0;
-  /// The coarse planes above the tiles; nullptr where there are none.
-  [[nodiscard]] virtual const Planes* planes() const { return nullptr; }
   /// A plane as a source of its own, 0 <= plane <= planes()->count(): its grid, ranges of all that lies below, codes of
   /// the same scale. It covers what this one does.
   [[nodiscard]] virtual const TileSource& plane(int) const { return *this; }
   /// A tile's heights in codes, not rounded, NaN where void: what shadows are computed from. [C x R] out.
   virtual void read_heights(TileIndex tile, std::span<float> heights) const;
-  /// Whether shadow seeds serve light along the rows that falls by so many codes, and no less, in a half step.
-  [[nodiscard]] virtual bool has_seeds(double) const { return false; }
   /// The casters of a tile's seeds, their heights like those that read_heights gives, which it gives as well.
   virtual CasterRows read_casters(TileIndex tile, LightTravel travel, std::span<float> heights) const;
-  /// From the archive's world to that of all else here.
-  [[nodiscard]] virtual GroundScale ground_scale() const { return {}; }
-  [[nodiscard]] WorldPoint from_archive(WorldPoint at) const;
-  [[nodiscard]] WorldPoint to_archive(WorldPoint at) const;
   /// All names of a place of that height, world units.
   [[nodiscard]] virtual Place describe(WorldPoint at, double height) const;
-  /// World units of one elevation unit; 1 where either is not known.
-  [[nodiscard]] virtual double world_per_elevation() const { return 1.0; }
   /// nullptr where there is no archive.
   [[nodiscard]] virtual const Metadata* metadata() const { return nullptr; }
-  /// Names of the ground's and the elevations' units; empty where they are not known.
-  [[nodiscard]] std::string ground_unit() const;
-  [[nodiscard]] std::string height_unit() const;
   /// Throws Error{kInvalidArgument} where the sun's way is not known.
   [[nodiscard]] virtual DaySky sky() const;
-  /// The record of the textures; nullptr where the source has none.
-  [[nodiscard]] virtual const TextureInfo* textures() const { return nullptr; }
   [[nodiscard]] virtual bool has_texture(TileIndex) const { return false; }
   /// A level of a tile's texture as RGBA with straight alpha. Throws Error naming the tile.
   [[nodiscard]] virtual Picture read_texture(TileIndex tile, int level) const;
+
+  [[nodiscard]] const TileGrid& grid() const { return facts_.grid; }
+  [[nodiscard]] ViewScale scale() const { return facts_.scale; }
+  [[nodiscard]] bool is_to_scale() const { return facts_.is_to_scale; }
+  [[nodiscard]] const WorldBounds& covered() const { return facts_.covered; }
+  /// nullptr where there are none.
+  [[nodiscard]] const Planes* planes() const { return facts_.planes ? &*facts_.planes : nullptr; }
+  [[nodiscard]] const TextureInfo* textures() const { return facts_.textures ? &*facts_.textures : nullptr; }
+  [[nodiscard]] bool has_seeds(double fall) const { return facts_.seeded_fall && fall >= *facts_.seeded_fall; }
+  [[nodiscard]] WorldPoint from_archive(WorldPoint at) const;
+  [[nodiscard]] WorldPoint to_archive(WorldPoint at) const;
+  /// World units of one elevation unit; 1 where either is not known.
+  [[nodiscard]] double world_per_elevation() const { return facts_.ground_scale.elevation; }
+  /// Names of the ground's and the elevations' units; empty where they are not known.
+  [[nodiscard]] std::string ground_unit() const;
+  [[nodiscard]] std::string height_unit() const;
+
+ protected:
+  SourceFacts facts_;
 
  private:
   friend TileBounds whole_bounds(const TileSource& source);
@@ -110,18 +127,13 @@ class TileSource {
 /// name  what messages call it; empty: its path
 [[nodiscard]] std::unique_ptr<TileSource> open_archive(const std::string& path, const std::string& name = "");
 
-/// Tile columns and rows first..last, inclusive; empty where last < first.
-struct TileRange {
-  std::int64_t first_column = 0;
-  std::int64_t last_column = -1;
-  std::int64_t first_row = 0;
-  std::int64_t last_row = -1;
-
-  [[nodiscard]] bool contains(TileIndex tile) const {
-    return tile.column >= first_column && tile.column <= last_column && tile.row >= first_row && tile.row <= last_row;
+/// Calls use(TileIndex) for each tile of a range, row by row.
+template <typename Use>
+void for_each_tile(const TileRange& range, const Use& use) {
+  for (std::int64_t row = range.first.row; row < range.end.row; ++row) {
+    for (std::int64_t column = range.first.column; column < range.end.column; ++column) use(TileIndex{column, row});
   }
-  friend bool operator==(const TileRange&, const TileRange&) = default;
-};
+}
 
 /// The box around a tile, from the eye.
 struct TileVolume {
