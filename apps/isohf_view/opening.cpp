@@ -1,8 +1,5 @@
 #include "opening.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
@@ -49,16 +46,8 @@ class ScratchArchive {
   std::string folder_;
 };
 
-/// Messages name settings between backticks: options of `isohf convert`, of which this program takes none.
-constexpr const char* kWhoseOptions = "options named here are isohf convert's: convert with them, and view the archive";
-bool names_options(const std::string& message) {
-  return message.find('`') != std::string::npos;
-}
-
-/// Converts options.archive if it is a raster; nullptr if it is not.
+/// The archive that a raster is converted to.
 std::unique_ptr<ScratchArchive> convert_for_viewing(const Options& options) {
-  const std::string& name = options.archive;
-  if (native_format_of(name, {}) == nullptr) return nullptr;
   auto scratch = std::make_unique<ScratchArchive>();
   ConvertOptions request;
   request.overwrite = true;
@@ -67,47 +56,27 @@ std::unique_ptr<ScratchArchive> convert_for_viewing(const Options& options) {
   job.threads = options.threads;
   job.machine_bytes = cli::machine_memory_bytes();
   job.cancel = &cli::watch_interrupts();
-  std::vector<Warning> warnings;
+  const std::unique_ptr<HeightSource> source = open_raster(options.archive, {});
+  understand_ground(source->info(), request.plan.ground);
   try {
-    const std::unique_ptr<HeightSource> source = open_raster(name, {});
-    understand_ground(source->info(), request.plan.ground);
-    warnings = convert(*source, scratch->path(), request, job).warnings;
+    const std::vector<Warning> warnings = convert(*source, scratch->path(), request, job).warnings;
+    if (!options.common.quiet) cli::print_warnings(options.common, warnings);
   } catch (const Error& error) {
     const std::string why = error.what();
+    const std::size_t kept = why.find("; " + scratch->path() + ".part keeps");
+    if (kept == std::string::npos) throw;
     // What is done goes when the program ends: nothing resumes it.
-    if (const std::size_t kept = why.find(fmt::format("; {}.part keeps", scratch->path())); kept != std::string::npos) {
-      throw Error(error.code(), why.substr(0, kept) + "; TMPDIR names another folder, with more room", error.parts());
-    }
-    if (!names_options(why)) throw;
-    throw Error(error.code(), fmt::format("{} ({})", why, kWhoseOptions), error.parts());
+    throw Error(error.code(), why.substr(0, kept) + "; TMPDIR names another folder, with more room", error.parts());
   }
-  if (options.common.quiet) return scratch;
-  cli::print_warnings(options.common, warnings);
-  if (std::any_of(warnings.begin(), warnings.end(), names_options)) cli::print_warning(options.common, kWhoseOptions);
   return scratch;
-}
-
-/// An archive, or what neither that nor a raster is.
-std::unique_ptr<TileSource> open_unconverted(const std::string& name) {
-  try {
-    return open_archive(name);
-  } catch (const Error& error) {
-    const bool is_called_archive = std::filesystem::path(name).extension() == ".isohf";
-    if (is_called_archive || error.code() != ErrorCode::kCorrupt) throw;
-    throw Error(error.code(),
-                fmt::format("{}; nor is it a raster of a kind that is viewed: isohf formats lists those "
-                            "that isohf convert reads",
-                            error.what()),
-                error.parts());
-  }
 }
 
 }  // namespace
 
 std::unique_ptr<TileSource> open_shown(const Options& options) {
+  if (native_format_of(options.archive, {}) == nullptr) return open_archive(options.archive);
   // An open file outlives its name: what is converted leaves nothing behind, however the program ends.
-  const auto shown = convert_for_viewing(options);
-  return shown ? open_archive(shown->path(), options.archive) : open_unconverted(options.archive);
+  return open_archive(convert_for_viewing(options)->path(), options.archive);
 }
 
 }  // namespace isohf::view

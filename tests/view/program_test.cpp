@@ -221,26 +221,14 @@ TEST_F(ViewProgramTest, ReplacesFilesOnlyWhenTold) {
   EXPECT_TRUE(is_png("kept.png"));
 }
 
-TEST_F(ViewProgramTest, SaysThatOptionsForARasterAreThoseOfConvert) {
+TEST_F(ViewProgramTest, RefusesWhatIsNeitherArchiveNorRaster) {
   const std::string shot = " --overwrite --size 64x48 --screenshot " + path("a.png");
-  const std::string whose = "options named here are isohf convert's: convert with them, and view the archive";
   test::write_file(path("bare.r16"), std::string(80000, 'x'));
-  const Outcome bare = run(path("bare.r16") + shot);
-  EXPECT_EQ(bare.exit_code, 2) << bare.err;
-  EXPECT_NE(bare.err.find("--raw WxH:TYPE must say"), std::string::npos) << bare.err;
-  EXPECT_NE(bare.err.find(" (" + whose + ")\n"), std::string::npos) << bare.err;
-  // Elevations that look like shares of a height.
-  std::string asc = "ncols 20\nnrows 20\nxllcorner 0\nyllcorner 0\ncellsize 1\n";
-  for (int i = 0; i < 400; ++i) asc += std::to_string((i * 37 % 100) / 100.0) + (i % 20 == 19 ? "\n" : " ");
-  test::write_file(path("shares.asc"), asc);
-  const Outcome shares = run(path("shares.asc") + shot);
-  EXPECT_EQ(shares.exit_code, 0) << shares.err;
-  EXPECT_NE(shares.err.find("--z-scale"), std::string::npos) << shares.err;
-  EXPECT_NE(shares.err.find("isohf-view: warning: " + whose + "\n"), std::string::npos) << shares.err;
+  EXPECT_EQ(run(path("bare.r16") + shot).exit_code, 2);
   test::write_file(path("notes.txt"), "no raster, no archive\n");
   const Outcome notes = run(path("notes.txt") + shot);
   EXPECT_EQ(notes.exit_code, 1);
-  EXPECT_NE(notes.err.find("nor is it a raster of a kind that is viewed"), std::string::npos) << notes.err;
+  EXPECT_EQ(std::count(notes.err.begin(), notes.err.end(), '\n'), 1) << notes.err;
 }
 
 TEST_F(ViewProgramTest, ShowsARasterAndLeavesNothingBehind) {
