@@ -67,10 +67,9 @@ std::string text_from(const ViewReport& report, const std::string& archive) {
     text += "shadows: not looked at, as tiles are at fault\n";
   } else {
     text += fmt::format(
-        "shadows: suns of {:g} degrees, East and West, {} vertices, {} of them from seeds, worst {:.2e} of the sun, "
-        "pixels {:.2e}\n",
+        "shadows: suns of {:g} degrees, East and West, {} vertices, {} of them from seeds, worst {:.2e} of the sun\n",
         fmt::join(report.suns_deg, ", "), cli::describe_count(report.shadow_vertices),
-        cli::describe_count(report.seeded_vertices), report.worst_shadow, report.worst_share);
+        cli::describe_count(report.seeded_vertices), report.worst_shadow);
   }
   if (report.passed()) return text + archive + ": archive, index arrays and shaders agree\n";
   for (const ViewFinding& found : report.findings) {
@@ -108,7 +107,6 @@ ordered_json json_from(const ViewReport& report, const std::string& archive) {
           {"shadow_vertices", report.shadow_vertices},
           {"seeded_vertices", report.seeded_vertices},
           {"worst_shadow", report.worst_shadow},
-          {"worst_share_of_sun", report.worst_share},
           {"failures", report.failures},
           {"findings", findings}};
 }

@@ -169,7 +169,7 @@ Renderer::Renderer(const TileSource& source, const SharedGeometry& shared)
       planes_(planes_of(source)),
       whole_(whole_bounds(source)),
       air_(air_of(source.metadata())),
-      flat_("wire", flat_fragment_shader),
+      flat_("wire", flat_fragment_shader()),
       sky_("sky", kSkyVertex, kSkyFragment) {
   const std::array<std::uint8_t, 4> nothing{};
   glBindTexture(GL_TEXTURE_2D, no_texture_.get());
@@ -199,11 +199,10 @@ void Renderer::set_palette(const std::vector<ColourStop>& stops, double low, dou
   glBindTexture(GL_TEXTURE_2D, 0);
 }
 
-const TerrainProgram& Renderer::shading(const ViewState& view, bool is_rim) {
-  const std::pair key{view.mode, is_rim};
-  const auto found = shading_.find(key);
+const TerrainProgram& Renderer::shading(ColourMode mode) {
+  const auto found = shading_.find(mode);
   if (found != shading_.end()) return found->second;
-  return shading_.try_emplace(key, "terrain", is_rim, terrain_fragment_shader(is_rim, view.mode)).first->second;
+  return shading_.try_emplace(mode, "terrain", terrain_fragment_shader(mode)).first->second;
 }
 
 double Renderer::level_of(const ViewState& view, PlaneTile at) const {
@@ -246,8 +245,8 @@ void Renderer::find_visible(Frame& frame, const TileRange& top, const ResidentTi
       if (textures_) texture = textures_(at);
       if (texture == 0) texture = no_texture_.get();
     }
-    frame.items.push_back({at, chosen.coarser_sides, slot, is_cut, is_cut || bounds.has_voids,
-                           length(0.5 * (box.low + box.high)), box.distance(), blend, texture});
+    frame.items.push_back(
+        {at, chosen.coarser_sides, slot, is_cut, length(0.5 * (box.low + box.high)), box.distance(), blend, texture});
   }
   std::sort(frame.items.begin(), frame.items.end(),
             [](const Item& a, const Item& b) { return a.distance < b.distance; });
@@ -326,29 +325,24 @@ void Renderer::draw_mesh(Frame& frame, const TerrainProgram& program, const Item
 
 void Renderer::draw_opaque(Frame& frame) {
   begin_opaque_pass();
-  for (const bool rim : {false, true}) {
-    const TerrainProgram& program = shading(frame.view, rim);
-    begin_shading(frame, program);
-    glUniform1f(program.uniform("alpha"), 1.0F);
-    for (const Item& item : frame.items) {
-      if (item.is_rim != rim) continue;
-      draw_mesh(frame, program, item, item.blend.first);
-      drawn_.push_back(item.at);
-    }
+  const TerrainProgram& program = shading(frame.view.mode);
+  begin_shading(frame, program);
+  glUniform1f(program.uniform("alpha"), 1.0F);
+  for (const Item& item : frame.items) {
+    draw_mesh(frame, program, item, item.blend.first);
+    drawn_.push_back(item.at);
   }
 }
 
 void Renderer::draw_fading(Frame& frame) {
   begin_fading_pass(!frame.view.wireframe);  // wires are those of the first mesh, and shown through the second
-  for (const bool rim : {false, true}) {
-    const TerrainProgram& program = shading(frame.view, rim);
-    begin_shading(frame, program);
-    for (auto item = frame.items.rbegin(); item != frame.items.rend(); ++item) {
-      if (item->is_rim != rim || !fades(*item)) continue;
-      order_fading(item->blend);
-      glUniform1f(program.uniform("alpha"), static_cast<float>(item->blend.alpha));
-      draw_mesh(frame, program, *item, item->blend.second);
-    }
+  const TerrainProgram& program = shading(frame.view.mode);
+  begin_shading(frame, program);
+  for (auto item = frame.items.rbegin(); item != frame.items.rend(); ++item) {
+    if (!fades(*item)) continue;
+    order_fading(item->blend);
+    glUniform1f(program.uniform("alpha"), static_cast<float>(item->blend.alpha));
+    draw_mesh(frame, program, *item, item->blend.second);
   }
   end_fading_pass();
 }
@@ -359,17 +353,13 @@ void Renderer::draw_wires(Frame& frame) const {
   glPolygonOffset(1.0F, 2.0F);
   glEnable(GL_BLEND);
   glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
-  for (const bool rim : {false, true}) {
-    const TerrainProgram& program = flat_.of(rim);
-    program.begin(source_.grid(), frame.terrain);
-    glUniform4f(program.uniform("flat_colour"), 0.05F, 0.06F, 0.09F, 0.7F);
-    for (const Item& item : frame.items) {
-      if (item.is_rim != rim) continue;
-      // Lines vanish where a triangle's side falls below eight pixels.
-      const double side = 2.0 * planes_.grid(item.at.plane).sigma_x() * (1 << item.blend.first);
-      glUniform1f(program.uniform("fade_distance"), static_cast<float>(side * frame.view.focal_px() / 8.0));
-      draw_mesh(frame, program, item, item.blend.first);
-    }
+  flat_.begin(source_.grid(), frame.terrain);
+  glUniform4f(flat_.uniform("flat_colour"), 0.05F, 0.06F, 0.09F, 0.7F);
+  for (const Item& item : frame.items) {
+    // Lines vanish where a triangle's side falls below eight pixels.
+    const double side = 2.0 * planes_.grid(item.at.plane).sigma_x() * (1 << item.blend.first);
+    glUniform1f(flat_.uniform("fade_distance"), static_cast<float>(side * frame.view.focal_px() / 8.0));
+    draw_mesh(frame, flat_, item, item.blend.first);
   }
   glDisable(GL_BLEND);
   glDisable(GL_POLYGON_OFFSET_LINE);

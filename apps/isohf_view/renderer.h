@@ -61,7 +61,6 @@ class Renderer {
     unsigned coarser_sides;
     const TileSlot* slot;
     bool is_cut;  ///< reaches beyond what the source covers
-    bool is_rim;  ///< is cut, or has voids
     double distance;
     double nearest;  ///< distance of the nearest point of the tile's box
     LodBlend blend;
@@ -85,7 +84,7 @@ class Renderer {
   [[nodiscard]] double level_of(const ViewState& view, PlaneTile at) const;
   void find_visible(Frame& frame, const TileRange& top, const ResidentTile& resident) const;
   /// Made when first wanted.
-  [[nodiscard]] const TerrainProgram& shading(const ViewState& view, bool is_rim);
+  [[nodiscard]] const TerrainProgram& shading(ColourMode mode);
   void draw_sky(const ViewState& view) const;
   void draw_opaque(Frame& frame);
   void draw_fading(Frame& frame);
@@ -99,9 +98,9 @@ class Renderer {
   Planes planes_;
   TileBounds whole_;
   Air air_;
-  std::map<std::pair<ColourMode, bool>, TerrainProgram> shading_;  ///< by mode, rim
+  std::map<ColourMode, TerrainProgram> shading_;
   std::vector<PlaneTile> drawn_;
-  TerrainPrograms flat_;
+  TerrainProgram flat_;
   Program sky_;
   TileTexture textures_;
   Texture no_texture_;  ///< one texel without alpha

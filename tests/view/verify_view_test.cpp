@@ -108,7 +108,7 @@ TEST_F(VerifyViewTest, FindsBrokenStrips) {
     expect_found(broken, finding::kDrawnCoverage, level, "the last triangle is missing");
     broken = sound;
     broken.strips[l].insert(broken.strips[l].begin(), broken.strips[l].front());
-    expect_found(broken, finding::kDrawnWinding, level, "all triangles face down");
+    expect_found(broken, finding::kDrawnMesh, level, "all triangles face down");
     broken = sound;
     for (std::uint32_t& index : broken.strips[l]) index += static_cast<std::uint32_t>(tiny_grid().shape().columns());
     for (std::uint32_t& index : broken.strips[l]) index = std::min<std::uint32_t>(index, 20 * 27 - 1);
@@ -204,7 +204,7 @@ TEST_F(VerifyViewTest, FindsShiftedPadding) {
       finding::kSharedVertex, "the North padding row is one column off");
 }
 
-/// Heights of tile (1,1) are wrong where shadows are computed; findings name a vertex and the sun.
+/// Heights of tile (1,1) are wrong where shadows are computed; findings name a vertex.
 void expect_shadows_found(const std::function<void(std::span<float>)>& spoil, const std::string& what) {
   MemoryTiles source(tiny_grid());
   source.set_heights([&](TileIndex tile, std::span<float> heights) {
@@ -216,7 +216,7 @@ void expect_shadows_found(const std::function<void(std::span<float>)>& spoil, co
     EXPECT_EQ(finding.id, finding::kDrawnShadow) << what;
     EXPECT_EQ(finding.tile.row, 1) << what;
     EXPECT_NE(finding.where.find("vertex (c "), std::string::npos) << what;
-    EXPECT_NE(finding.where.find(" at "), std::string::npos) << what;
+    EXPECT_NE(finding.where.find("casts shadows as"), std::string::npos) << what;
   }
 }
 

@@ -5,9 +5,7 @@
 namespace isohf::view {
 namespace {
 
-std::string header(bool rim) {
-  return rim ? "#version 330 core\n#define RIM\n" : "#version 330 core\n";
-}
+constexpr const char* kHeader = "#version 330 core\n";
 
 // Positions: a vertex's place in the whole heightfield is an integer (LatticeVertex). Only its distance from an anchor
 // near the eye becomes a float, by the same operations for every tile, so that two tiles put a shared vertex in exactly
@@ -33,15 +31,13 @@ uniform vec2 sigma;             // world units of one object-space step in x and
 uniform vec3 anchor;            // the anchor's place, seen from the eye; y: elevation of code 0
 uniform float code_height;      // world units of one code, exaggeration included
 uniform mat4 clip_from_eye;
-invariant gl_Position;          // programs with RIM and without put a vertex in the same place
+invariant gl_Position;          // all programs put a vertex in the same place
 // Two slots of four: a software rasteriser pays for each slot and triangle.
 out vec4 v_facing;              // unit normal, distance from the eye
 out vec4 v_place;               // object space x and z, elevation code, depth in the shadow
-#ifdef RIM
 uniform vec4 covered;           // West, North, East, South of what is shown, seen from the eye
 out float gl_ClipDistance[4];   // only looked at where the renderer asks for it
 centroid out float v_void;       // not beyond the triangle, where a pixel of several samples only touches it
-#endif
 
 int code(int v) { return int(texelFetch(codes, v).r); }
 
@@ -83,7 +79,6 @@ vec3 vertex_normal(int v, int own) {
     steps_z = 2 * (west_share + east_share);
     steps_x = edge ? 4 : steps_z;
   }
-#ifdef RIM
   int worst = max(max(before, own), behind);
   ivec4 either = max(n, s);
   if (odd) {
@@ -93,7 +88,6 @@ vec3 vertex_normal(int v, int own) {
     worst = max(worst, max(west ? 0 : either.x, east ? 0 : either.y));
   }
   if (worst == 65535) return vec3(0.0, 1.0, 0.0);
-#endif
   return normalize(vec3(float(rise_x) * code_height / (float(steps_x * stride) * sigma.x), 1.0,
                         float(rise_z) * code_height / (float(steps_z * stride) * sigma.y)));
 }
@@ -108,29 +102,17 @@ void main() {
   v_facing = vec4(vertex_normal(v, own), length(eye));
   v_place = vec4(vec2(lattice - tile_lattice) / float(stride), float(own), shadow);
   gl_Position = clip_from_eye * vec4(eye, 1.0);
-#ifdef RIM
   v_void = own == 65535 ? 1.0 : 0.0;
   gl_ClipDistance[0] = eye.x - covered.x;
   gl_ClipDistance[1] = eye.z - covered.y;
   gl_ClipDistance[2] = covered.z - eye.x;
   gl_ClipDistance[3] = covered.w - eye.z;
-#endif
 }
 )glsl";
 
 constexpr const char* kDiscardVoid = R"glsl(
-#ifdef RIM
 centroid in float v_void;
 #define DISCARD_VOID if (v_void > 0.0) discard
-#else
-#define DISCARD_VOID
-#endif
-)glsl";
-
-// What is hidden of the sun goes beyond 0 and 1, so that a border lies between two vertices (shadow_front.h).
-constexpr const char* kSunShare = R"glsl(
-uniform float shadow_gain;      // part of the sun that 1 hides; 0: no shadows
-float sun_share() { return clamp(1.0 - v_place.w * shadow_gain, 0.0, 1.0); }
 )glsl";
 
 // MODE as in view_state.h: 0 elevation colours, 1 levels of detail, 2 strip order, 3 texture, 4 normals. Each
@@ -155,7 +137,7 @@ uniform vec3 horizon;
 uniform sampler2D palette;      // colours along the ramp, to the power of 1.6
 uniform sampler2D tile_texture; // colours as coded, multiplied by alpha
 uniform vec4 texture_place;     // texture coordinates = object space * xy + zw
-float sun_share();
+uniform float shadow_gain;      // part of the sun that 1 hides; 0: no shadows
 
 #if MODE == 0 || MODE == 3
 vec3 hypsometric() { return texture(palette, vec2((v_place.z - ramp.x) * ramp.y, 0.5)).rgb; }
@@ -201,7 +183,8 @@ void main() {
   vec3 shown = normal * 0.5 + 0.5;
 #else
   vec3 base = base_colour();
-  float direct = max(dot(normal, sun), 0.0) * sun_share();
+  // What is hidden goes beyond 0 and 1, so that a border lies between two vertices (shadow_front.h).
+  float direct = max(dot(normal, sun), 0.0) * clamp(1.0 - v_place.w * shadow_gain, 0.0, 1.0);
   vec3 shown = base * (sky_light * (0.5 + 0.5 * normal.y) + sun_light * direct);
 #endif
   float far = clamp((v_facing.w - haze.x) * haze.y, 0.0, 1.0);
@@ -221,16 +204,6 @@ void main() {
 }
 )glsl";
 
-constexpr const char* kShadowProbeFragment = R"glsl(
-in vec4 v_place;
-out vec4 probe;
-float sun_share();
-void main() {
-  DISCARD_VOID;
-  probe = vec4(sun_share(), v_place.w, 0.0, 1.0);
-}
-)glsl";
-
 constexpr const char* kFlatFragment = R"glsl(
 in vec4 v_facing;
 out vec4 colour;
@@ -245,23 +218,20 @@ void main() {
 
 }  // namespace
 
-std::string terrain_fragment_shader(bool rim, ColourMode mode) {
-  return header(rim) + "#define MODE " + std::to_string(static_cast<int>(mode)) + "\n" + kDiscardVoid +
-         kTerrainFragment + kSunShare;
+std::string terrain_fragment_shader(ColourMode mode) {
+  return kHeader + std::string("#define MODE ") + std::to_string(static_cast<int>(mode)) + "\n" + kDiscardVoid +
+         kTerrainFragment;
 }
-std::string probe_fragment_shader(bool rim) {
-  return header(rim) + kDiscardVoid + kProbeFragment;
+std::string probe_fragment_shader() {
+  return kHeader + std::string(kDiscardVoid) + kProbeFragment;
 }
-std::string shadow_probe_fragment_shader(bool rim) {
-  return header(rim) + kDiscardVoid + kShadowProbeFragment + kSunShare;
-}
-std::string flat_fragment_shader(bool rim) {
-  return header(rim) + kDiscardVoid + kFlatFragment;
+std::string flat_fragment_shader() {
+  return kHeader + std::string(kDiscardVoid) + kFlatFragment;
 }
 
-TerrainProgram::TerrainProgram(const std::string& name, bool rim, const std::string& fragment_source,
+TerrainProgram::TerrainProgram(const std::string& name, const std::string& fragment_source,
                                const std::vector<std::string>& feedback)
-    : program_(name, header(rim) + kTerrainVertex, fragment_source, feedback) {}
+    : program_(name, kHeader + std::string(kTerrainVertex), fragment_source, feedback) {}
 
 void TerrainProgram::begin(const TileGrid& grid, const TerrainFrame& frame) const {
   program_.use();

@@ -11,16 +11,12 @@
 
 namespace isohf::view {
 
-/// Fragment shaders for the terrain. `rim` is the variant for tiles with voids, or that reach beyond what the source
-/// covers: it discards voids and has clip distances.
-/// Light, colours and haze. A program for each mode.
-[[nodiscard]] std::string terrain_fragment_shader(bool rim, ColourMode mode);
+/// Fragment shaders for the terrain; they discard voids. Light, colours and haze: one for each mode.
+[[nodiscard]] std::string terrain_fragment_shader(ColourMode mode);
 /// (elevation code, normal x, normal z, 1): what verifying reads back.
-[[nodiscard]] std::string probe_fragment_shader(bool rim);
-/// (share of the sun, depth in the shadow, 0, 1): what verifying reads back of shadows.
-[[nodiscard]] std::string shadow_probe_fragment_shader(bool rim);
+[[nodiscard]] std::string probe_fragment_shader();
 /// One flat colour: wireframes.
-[[nodiscard]] std::string flat_fragment_shader(bool rim);
+[[nodiscard]] std::string flat_fragment_shader();
 
 /// The uniforms of the terrain's vertex shader that hold for a whole frame.
 struct TerrainFrame {
@@ -37,7 +33,7 @@ struct TerrainFrame {
 /// Texture units: 0 the tile's texture, 1 the palette, 2 its elevation codes, which TileSlot::bind() binds.
 class TerrainProgram {
  public:
-  TerrainProgram(const std::string& name, bool rim, const std::string& fragment_source,
+  TerrainProgram(const std::string& name, const std::string& fragment_source,
                  const std::vector<std::string>& feedback = {});
 
   /// Makes the program current and sets the frame's uniforms.
@@ -50,17 +46,6 @@ class TerrainProgram {
 
  private:
   Program program_;
-};
-
-/// Both variants of a program.
-struct TerrainPrograms {
-  TerrainPrograms(const std::string& name, std::string (*fragment)(bool rim),
-                  const std::vector<std::string>& feedback = {})
-      : inner(name, false, fragment(false), feedback), rim(name, true, fragment(true), feedback) {}
-  [[nodiscard]] const TerrainProgram& of(bool is_rim) const { return is_rim ? rim : inner; }
-
-  TerrainProgram inner;
-  TerrainProgram rim;
 };
 
 }  // namespace isohf::view

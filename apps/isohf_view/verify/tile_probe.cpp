@@ -18,9 +18,8 @@ int largest(const std::vector<PixelWindow>& windows, int PixelWindow::*side) {
 TileProbe::TileProbe(const TileGrid& grid, const SharedGeometry& shared, double code_height)
     : grid_(grid),
       shared_(shared),
-      height_("probe", probe_fragment_shader),
-      shadow_("shadow probe", shadow_probe_fragment_shader),
-      feedback_("capture", probe_fragment_shader, {"gl_Position", "v_facing", "v_place"}),
+      height_("probe", probe_fragment_shader()),
+      feedback_("capture", probe_fragment_shader(), {"gl_Position", "v_facing", "v_place"}),
       target_(largest(MeshOracle(grid.shape()).windows(), &PixelWindow::width),
               largest(MeshOracle(grid.shape()).windows(), &PixelWindow::height), GL_RGBA32F) {
   frame_.code_height = code_height;
@@ -50,66 +49,48 @@ void TileProbe::begin(const TerrainProgram& program, const PixelWindow& window) 
   glUniform1f(program.uniform("alpha"), 1.0F);
 }
 
-void TileProbe::draw_mesh(const TileSlot& slot, int level, bool cull) {
+void TileProbe::draw_mesh(const TileSlot& slot, int level) {
   slot.bind();
-  if (cull) {
-    glEnable(GL_CULL_FACE);
-  } else {
-    glDisable(GL_CULL_FACE);
-  }
+  glEnable(GL_CULL_FACE);
   shared_.draw_strip(level);
   glDisable(GL_CULL_FACE);
   if (shared_.has_stitch(level)) shared_.draw_stitch(level);
 }
 
-void TileProbe::draw_level(const TileSlot& slot, bool voids, int level, const PixelWindow& window, bool cull,
-                           std::vector<float>& out) {
-  begin(height_.of(voids), window);
-  add_up(slot, level, cull, out);
-}
-
-void TileProbe::draw_shadow(const TileSlot& slot, bool voids, int level, const PixelWindow& window, float gain,
-                            std::vector<float>& out) {
-  const TerrainProgram& program = shadow_.of(voids);
-  begin(program, window);
-  glUniform1f(program.uniform("shadow_gain"), gain);
-  add_up(slot, level, true, out);
-}
-
-void TileProbe::add_up(const TileSlot& slot, int level, bool cull, std::vector<float>& out) {
+void TileProbe::draw_level(const TileSlot& slot, int level, const PixelWindow& window, std::vector<float>& out) {
+  begin(height_, window);
   glDisable(GL_DEPTH_TEST);
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE);
-  draw_mesh(slot, level, cull);
+  draw_mesh(slot, level);
   glDisable(GL_BLEND);
   target_.read_rgba32f(out);
 }
 
-void TileProbe::draw_blend(const TileSlot& slot, bool voids, const LodBlend& blend, const PixelWindow& window,
+void TileProbe::draw_blend(const TileSlot& slot, const LodBlend& blend, const PixelWindow& window,
                            std::vector<float>& out) {
-  begin(height_.of(voids), window);
+  begin(height_, window);
   begin_opaque_pass();
-  draw_mesh(slot, blend.first, true);
+  draw_mesh(slot, blend.first);
   if (blend.alpha > 0.0 && blend.second != blend.first) {
     begin_fading_pass();
     order_fading(blend);
-    glUniform1f(height_.of(voids).uniform("alpha"), static_cast<float>(blend.alpha));
-    draw_mesh(slot, blend.second, true);
+    glUniform1f(height_.uniform("alpha"), static_cast<float>(blend.alpha));
+    draw_mesh(slot, blend.second);
     end_fading_pass();
   }
   target_.read_rgba32f(out);
 }
 
-void TileProbe::capture(const TileSlot& slot, TileIndex tile, bool voids, std::vector<ProbedVertex>& out) {
+void TileProbe::capture(const TileSlot& slot, TileIndex tile, std::vector<ProbedVertex>& out) {
   out.resize(static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
   const auto bytes = static_cast<GLsizeiptr>(out.size() * sizeof(ProbedVertex));
   glBindBuffer(GL_TRANSFORM_FEEDBACK_BUFFER, captured_.get());
   glBufferData(GL_TRANSFORM_FEEDBACK_BUFFER, bytes, nullptr, GL_STREAM_READ);
   glBindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, captured_.get());
-  const TerrainProgram& program = feedback_.of(voids);
   frame_.clip_from_eye = Mat4::identity();  // clip positions are then the vertices' places
-  program.begin(grid_, frame_);
-  program.set_tile(grid_, frame_, tile);
+  feedback_.begin(grid_, frame_);
+  feedback_.set_tile(grid_, frame_, tile);
   slot.bind();
   glEnable(GL_RASTERIZER_DISCARD);
   glBeginTransformFeedback(GL_POINTS);

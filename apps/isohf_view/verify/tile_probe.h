@@ -23,31 +23,23 @@ class TileProbe {
  public:
   TileProbe(const TileGrid& grid, const SharedGeometry& shared, double code_height);
 
-  /// Strip and stitch of one level, added up: `cull` leaves back faces out. Rows from the South.
-  void draw_level(const TileSlot& slot, bool voids, int level, const PixelWindow& window, bool cull,
-                  std::vector<float>& out);
+  /// Strip and stitch of one level, added up, without back faces. Rows from the South.
+  void draw_level(const TileSlot& slot, int level, const PixelWindow& window, std::vector<float>& out);
   /// The two-stage transition, by the same passes as pictures.
-  void draw_blend(const TileSlot& slot, bool voids, const LodBlend& blend, const PixelWindow& window,
-                  std::vector<float>& out);
-  /// What the fragment shader makes of the shadow, strip and stitch of one level added up: (share of the sun, depth,
-  /// 0, count). gain is the slot's.
-  void draw_shadow(const TileSlot& slot, bool voids, int level, const PixelWindow& window, float gain,
-                   std::vector<float>& out);
+  void draw_blend(const TileSlot& slot, const LodBlend& blend, const PixelWindow& window, std::vector<float>& out);
   /// All stored vertices, drawn as those of `tile`; padding gets no sensible normal.
-  void capture(const TileSlot& slot, TileIndex tile, bool voids, std::vector<ProbedVertex>& out);
+  void capture(const TileSlot& slot, TileIndex tile, std::vector<ProbedVertex>& out);
   [[nodiscard]] int width() const { return target_.width(); }  ///< pixels of a row of the pictures
 
  private:
   void begin(const TerrainProgram& program, const PixelWindow& window);
-  void add_up(const TileSlot& slot, int level, bool cull, std::vector<float>& out);
-  void draw_mesh(const TileSlot& slot, int level, bool cull);
+  void draw_mesh(const TileSlot& slot, int level);
 
   const TileGrid& grid_;
   const SharedGeometry& shared_;
   TerrainFrame frame_;
-  TerrainPrograms height_;
-  TerrainPrograms shadow_;
-  TerrainPrograms feedback_;
+  TerrainProgram height_;
+  TerrainProgram feedback_;
   Offscreen target_;
   Buffer captured_;
 };

@@ -34,9 +34,8 @@ class ShadowVerifier {
  private:
   void verify_row(std::int64_t row);
   [[nodiscard]] bool are_heights_drawn(TileIndex tile);
-  void verify_tile(const TileShadow& swept, const RowSun& sun, std::size_t sun_number);
+  void verify_tile(const TileShadow& swept, const RowSun& sun);
   void check_vertices(const TileShadow& swept, const RowSun& sun);
-  void check_share(TileIndex tile, const RowSun& sun, int level, const PixelWindow& window);
 
   const CheckContext& context_;
   const TileSource& source_;
@@ -44,11 +43,9 @@ class ShadowVerifier {
   ViewReport& report_;
   TileSlot slot_;
   std::vector<std::uint16_t> codes_;
-  std::vector<float> heights_;          ///< that cast shadows
-  TileShadow drawn_;                    ///< what pictures are drawn with
-  std::vector<std::uint16_t> sampled_;  ///< its depths, from 0 on
+  std::vector<float> heights_;  ///< that cast shadows
+  TileShadow drawn_;            ///< what pictures are drawn with
   std::vector<ProbedVertex> captured_;
-  std::vector<float> pixels_;
 };
 
 ShadowVerifier::ShadowVerifier(const CheckContext& context)
@@ -58,8 +55,7 @@ ShadowVerifier::ShadowVerifier(const CheckContext& context)
       report_(context.report),
       slot_(context.shared),
       codes_(static_cast<std::size_t>(source_.grid().shape().stored_vertex_count())),
-      heights_(codes_.size()),
-      sampled_(codes_.size()) {}
+      heights_(codes_.size()) {}
 
 void ShadowVerifier::verify() {
   const TileGrid& grid = source_.grid();
@@ -81,12 +77,12 @@ void ShadowVerifier::verify_row(std::int64_t row) {
   const std::atomic<bool> leaves{false};
   std::string unread;  // the tile's own check says so
   for (const LightTravel travel : {LightTravel::kEastward, LightTravel::kWestward}) {
-    for (std::size_t k = 0; k < std::size(kElevations_deg); ++k) {
-      const RowSun sun{travel, kElevations_deg[k]};
+    for (const double elevation_deg : kElevations_deg) {
+      const RowSun sun{travel, elevation_deg};
       for (const TileShadow& swept : cast_shadows(source_, sun.casting(), tiles, whole_row, leaves, unread)) {
         // By itself, as it is drawn.
         drawn_ = std::move(cast_shadows(source_, sun.casting(), {swept.tile}, {}, leaves, unread).front());
-        verify_tile(swept, sun, k);
+        verify_tile(swept, sun);
       }
     }
   }
@@ -117,20 +113,12 @@ bool ShadowVerifier::are_heights_drawn(TileIndex tile) {
   return !worst.any();
 }
 
-void ShadowVerifier::verify_tile(const TileShadow& swept, const RowSun& sun, std::size_t sun_number) {
-  const TileIndex tile = swept.tile;
-  const TileShape& shape = source_.grid().shape();
-  source_.read(tile, codes_);
+void ShadowVerifier::verify_tile(const TileShadow& swept, const RowSun& sun) {
+  source_.read(swept.tile, codes_);
   slot_.upload(codes_);
-  std::transform(drawn_.depths.begin(), drawn_.depths.end(), sampled_.begin(),
-                 [](std::int16_t depth) { return static_cast<std::uint16_t>(depth + static_cast<int>(kDepthSteps)); });
   slot_.upload_shadow(drawn_.depths, drawn_.gain);
-  probe_.capture(slot_, {0, 0}, context_.has_voids(tile), captured_);
+  probe_.capture(slot_, {0, 0}, captured_);
   check_vertices(swept, sun);
-  // Each tile at one level a sun, all levels in turn.
-  const auto turn = static_cast<std::size_t>(tile.column + tile.row) + sun_number;
-  const int level = static_cast<int>(turn % static_cast<std::size_t>(shape.levels()));
-  for (const PixelWindow& window : context_.oracle.windows()) check_share(tile, sun, level, window);
 }
 
 void ShadowVerifier::check_vertices(const TileShadow& swept, const RowSun& sun) {
@@ -161,34 +149,6 @@ void ShadowVerifier::check_vertices(const TileShadow& swept, const RowSun& sun) 
     }
   }
   worst.report(report_, finding::kDrawnShadow, swept.tile, 0.0);
-}
-
-// The vertices' depths have been looked at: from them the library's barycentric depth.
-void ShadowVerifier::check_share(TileIndex tile, const RowSun& sun, int level, const PixelWindow& window) {
-  constexpr double kSteps = kDepthSteps;
-  const TileShape& shape = source_.grid().shape();
-  probe_.draw_shadow(slot_, context_.has_voids(tile), level, window, drawn_.gain, pixels_);
-  ++report_.pictures;
-  const std::span<const PixelSample> samples = context_.oracle.samples(level, window);
-  const double reach = window.x0 + window.z0 + window.width + window.height;
-  Worst worst;
-  for_each_pixel(window, probe_.width(), [&](int i, int j, std::size_t k, std::size_t at) {
-    const SampledCode ground = sample_code(samples[k], codes_);
-    const float* got = pixels_.data() + at;
-    if (!ground.valid || got[3] != 1.0F) return;  // coverage is another check's
-    ++report_.pixels;
-    const SampledCode depth = sample_code(samples[k], sampled_);
-    const double deep = (depth.code - kSteps) / kSteps;
-    const double want = std::clamp(1.0 - drawn_.gain * deep, 0.0, 1.0);
-    const double off = std::abs(got[0] - want);
-    report_.worst_share = std::max(report_.worst_share, off);
-    if (off <= drawn_.gain * (kCodeTolerance + depth.spread * reach * kPerPixel) / kSteps) return;
-    worst.add(off, [&] {
-      return fmt::format("{}, {}: share {:.4f} of the sun, library {:.4f}", pixel_name(shape, window, i, j, samples[k]),
-                         sun_name(sun), got[0], want);
-    });
-  });
-  worst.report(report_, finding::kDrawnSunShare, tile, level);
 }
 
 }  // namespace

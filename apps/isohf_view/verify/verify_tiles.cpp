@@ -45,14 +45,12 @@ class TileVerifier {
   void check_shared(TileIndex tile);
   void check_level(TileIndex tile, int level, const PixelWindow& window);
   void check_transition(TileIndex tile, double level, const PixelWindow& window);
-  void diagnose_coverage(int level, const PixelWindow& window, ViewFinding found);
 
   const CheckContext& context_;
   const TileSource& source_;
   ViewReport& report_;
   TileProbe& probe_;
   TileSlot slot_;
-  bool voids_ = false;  ///< of the tile in hand
   std::vector<std::uint16_t> codes_;
   std::vector<Normal> normals_;
   std::vector<ProbedVertex> captured_;  ///< drawn as tile (0, 0), whose places are exact enough
@@ -75,9 +73,8 @@ void TileVerifier::verify(TileIndex tile) {
   const std::vector<float> heights = heights_from(codes_, source_.scale().scale);
   tile_normals(source_.grid(), View2D<const float>(heights.data(), shape.columns(), shape.rows()),
                View2D<Normal>(normals_.data(), shape.columns(), shape.rows()));
-  voids_ = context_.has_voids(tile);
-  probe_.capture(slot_, {0, 0}, voids_, captured_);
-  probe_.capture(slot_, tile, voids_, placed_);
+  probe_.capture(slot_, {0, 0}, captured_);
+  probe_.capture(slot_, tile, placed_);
   check_vertices(tile);
   check_shared(tile);
   const int levels = shape.levels();
@@ -180,7 +177,7 @@ void TileVerifier::check_shared(TileIndex tile) {
 void TileVerifier::check_level(TileIndex tile, int level, const PixelWindow& window) {
   const TileShape& shape = source_.grid().shape();
   const std::span<const PixelSample> samples = context_.oracle.samples(level, window);
-  probe_.draw_level(slot_, voids_, level, window, true, pixels_);
+  probe_.draw_level(slot_, level, window, pixels_);
   ++report_.pictures;
   Worst coverage;
   Worst height;
@@ -224,34 +221,18 @@ void TileVerifier::check_level(TileIndex tile, int level, const PixelWindow& win
       });
     }
   });
-  if (coverage.any()) diagnose_coverage(level, window, coverage.worst(finding::kDrawnCoverage, tile, level));
+  coverage.report(report_, finding::kDrawnCoverage, tile, level);
   height.report(report_, finding::kDrawnHeight, tile, level);
   normal.report(report_, finding::kDrawnNormal, tile, level);
 }
 
-/// A tile that is whole once back faces are drawn too has triangles that wind the wrong way.
-void TileVerifier::diagnose_coverage(int level, const PixelWindow& window, ViewFinding found) {
-  const std::span<const PixelSample> samples = context_.oracle.samples(level, window);
-  probe_.draw_level(slot_, voids_, level, window, false, pixels_);
-  bool whole = true;
-  for_each_pixel(window, probe_.width(), [&](int, int, std::size_t k, std::size_t at) {
-    whole = whole && pixels_[at + 3] == (sample_code(samples[k], codes_).valid ? 1.0F : 0.0F);
-  });
-  if (whole) {
-    found.id = finding::kDrawnWinding;
-    found.where += " (whole once back faces are drawn: the triangle faces down)";
-  }
-  report_.add(std::move(found));
-}
-
-// Seen from above the first mesh covers all; the second, fading in with alpha, shows where it lies higher.
 void TileVerifier::check_transition(TileIndex tile, double level, const PixelWindow& window) {
   const TileShape& shape = source_.grid().shape();
   const LodBlend blend = lod_blend(level, shape.levels());
   const std::span<const PixelSample> first_kept = context_.oracle.samples(blend.first, window);
   const std::vector<PixelSample> first(first_kept.begin(), first_kept.end());
   const std::span<const PixelSample> second = context_.oracle.samples(blend.second, window);
-  probe_.draw_blend(slot_, voids_, blend, window, pixels_);
+  probe_.draw_blend(slot_, blend, window, pixels_);
   ++report_.pictures;
   Worst worst;
   const double reach = window.x0 + window.z0 + window.width + window.height;

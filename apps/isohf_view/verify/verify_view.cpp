@@ -48,19 +48,13 @@ std::vector<std::uint32_t> border(const TileShape& shape) {
 }  // namespace
 
 std::string check_name(int id) {
-  static const std::map<int, const char*> kNames{{finding::kTileUndecodable, "readable"},
-                                                 {finding::kSharedVertex, "shared vertices"},
-                                                 {finding::kNormal, "shared vertices"},
-                                                 {finding::kDrawnVertex, "vertices"},
-                                                 {finding::kDrawnCoverage, "coverage"},
-                                                 {finding::kDrawnWinding, "winding"},
-                                                 {finding::kDrawnHeight, "heights"},
-                                                 {finding::kDrawnNormal, "normals"},
-                                                 {finding::kDrawnTransition, "transitions"},
-                                                 {finding::kDrawnCrack, "cracks"},
-                                                 {finding::kDrawnMesh, "mesh"},
-                                                 {finding::kDrawnShadow, "shadows"},
-                                                 {finding::kDrawnSunShare, "share of the sun"}};
+  static const std::map<int, const char*> kNames{
+      {finding::kTileUndecodable, "readable"}, {finding::kSharedVertex, "shared vertices"},
+      {finding::kNormal, "shared vertices"},   {finding::kDrawnVertex, "vertices"},
+      {finding::kDrawnCoverage, "coverage"},   {finding::kDrawnHeight, "heights"},
+      {finding::kDrawnNormal, "normals"},      {finding::kDrawnTransition, "transitions"},
+      {finding::kDrawnCrack, "cracks"},        {finding::kDrawnMesh, "mesh"},
+      {finding::kDrawnShadow, "shadows"}};
   return kNames.at(id);
 }
 

@@ -28,7 +28,7 @@ struct ViewChecks {
   std::vector<double> fractions{0.25, 0.5, 0.8};  ///< β of the transitions looked at between each two levels
   bool shadows = true;
   /// Only these tiles, and the rows of their shadows.
-  std::optional<isohf::TileRange> tiles;
+  std::optional<TileRange> tiles;
   /// Called now and then with what is looked at, how much of it has been, and all of it.
   std::function<void(const char*, std::int64_t, std::int64_t)> progress;
 };
@@ -43,7 +43,6 @@ struct ViewReport {
   std::int64_t seeded_vertices = 0;  ///< of them, drawn from shadow seeds
   std::vector<double> suns_deg;      ///< that shadows were looked at for, from either side
   double worst_shadow = 0.0;         ///< part of the sun that is hidden
-  double worst_share = 0.0;          ///< of the sun
   double worst_height = 0.0;         ///< codes, within tolerance or not
   double worst_normal = 0.0;
   std::int64_t failures = 0;          ///< findings in all
@@ -79,12 +78,6 @@ struct CheckContext {
   TileProbe& probe;
   const ViewChecks& options;
   ViewReport& report;
-
-  /// True where a tile must be drawn with the shaders that discard voids.
-  [[nodiscard]] bool has_voids(TileIndex tile) const {
-    const TileBounds bounds = source.bounds(tile);
-    return bounds.has_voids || !bounds.stored;
-  }
 };
 
 /// Reads the index arrays back from the GPU and checks each level's mesh, strip and stitch together: every side that is
@@ -120,10 +113,7 @@ class Worst {
   [[nodiscard]] bool any() const { return count_ > 0; }
   /// Reports the worst, if there was any.
   void report(ViewReport& report, int id, TileIndex tile, double level) const {
-    if (any()) report.add(worst(id, tile, level));
-  }
-  [[nodiscard]] ViewFinding worst(int id, TileIndex tile, double level) const {
-    return {id, tile, level, where_, worst_, count_};
+    if (any()) report.add({id, tile, level, where_, worst_, count_});
   }
 
  private:
