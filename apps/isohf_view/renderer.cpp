@@ -130,8 +130,7 @@ TerrainFrame terrain_frame(const TileSource& source, const ViewState& view, doub
   return frame;
 }
 
-}  // namespace
-
+// Depth runs from 1 near to 0 far.
 void begin_opaque_pass() {
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_GREATER);
@@ -162,6 +161,8 @@ void end_fading_pass() {
   glDepthMask(GL_TRUE);
   glDisable(GL_BLEND);
 }
+
+}  // namespace
 
 Renderer::Renderer(const TileSource& source, const SharedGeometry& shared)
     : source_(source),
@@ -301,7 +302,6 @@ void Renderer::draw_mesh(Frame& frame, const TerrainProgram& program, const Item
   glEnable(GL_CULL_FACE);
   shared_.draw_strip(level);
   frame.figures.triangles += shape.strip_triangle_count(level);
-  ++frame.figures.draw_calls;
   if (shared_.has_stitch(level)) {
     // Stitch triangles stand upright and are seen from either side.
     glUniform1i(program.uniform("is_stitch"), 1);
@@ -309,7 +309,6 @@ void Renderer::draw_mesh(Frame& frame, const TerrainProgram& program, const Item
     glDisable(GL_CULL_FACE);
     shared_.draw_stitch(level);
     frame.figures.triangles += shape.stitch_triangle_count(level);
-    ++frame.figures.draw_calls;
   }
   if (item.coarser_sides != 0) {
     glUniform1i(program.uniform("is_stitch"), 1);
@@ -317,7 +316,6 @@ void Renderer::draw_mesh(Frame& frame, const TerrainProgram& program, const Item
     for (int side = 0; side < 4; ++side) {
       if ((item.coarser_sides >> static_cast<unsigned>(side) & 1U) == 0) continue;
       frame.figures.triangles += shared_.draw_side(side);
-      ++frame.figures.draw_calls;
     }
   }
   if (item.is_cut) set_cutting(false);

@@ -28,7 +28,6 @@ struct FrameFigures {
   std::int64_t visible_tiles = 0;  ///< in the view and resident
   std::int64_t absent_tiles = 0;   ///< in the view, stored, not resident yet
   std::int64_t triangles = 0;
-  std::int64_t draw_calls = 0;  ///< of terrain: two for each visible tile and pass, and sides
 };
 
 /// Finds a tile's buffers; nullptr where the tile is not resident.
@@ -107,12 +106,5 @@ class Renderer {
   Texture palette_;
   VertexArray nothing_;
 };
-
-/// The GL state of the opaque and of the fading pass; verifying draws with the same. Depth runs from 1 near to 0 far.
-void begin_opaque_pass();
-void begin_fading_pass(bool write_depth = true);
-/// Before a tile's second mesh is drawn in the fading pass.
-void order_fading(const LodBlend& blend);
-void end_fading_pass();
 
 }  // namespace isohf::view

@@ -53,12 +53,9 @@ class MemoryTiles final : public view::TileSource {
  private:
   [[nodiscard]] view::TileBounds measure(TileIndex tile) const {
     const auto codes = make(tile);
-    view::TileBounds bounds{false, false, 1e9, -1e9};
+    view::TileBounds bounds{false, 1e9, -1e9};
     for (const std::uint16_t code : codes) {
-      if (code == view::kVoidCode) {
-        bounds.has_voids = true;
-        continue;
-      }
+      if (code == view::kVoidCode) continue;
       bounds.stored = true;
       bounds.low = std::min(bounds.low, scale().offset + scale().scale * code);
       bounds.high = std::max(bounds.high, scale().offset + scale().scale * code);

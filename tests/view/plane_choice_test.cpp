@@ -109,11 +109,11 @@ class MemoryPlanes final : public TileSource {
         : TileSource({whole.planes()->grid(plane), whole.scale(), whole.covered()}), whole_(whole), plane_(plane) {}
     [[nodiscard]] TileBounds bounds(TileIndex tile) const override {
       const TileRange range = whole_.planes()->below(plane_, tile);
-      TileBounds all{false, false, 1e9, -1e9};
+      TileBounds all{false, 1e9, -1e9};
       for (std::int64_t row = range.first.row; row < range.end.row; ++row) {
         for (std::int64_t column = range.first.column; column < range.end.column; ++column) {
           const TileBounds one = whole_.plane(plane_ - 1).bounds({column, row});
-          all = {true, false, std::min(all.low, one.low), std::max(all.high, one.high)};
+          all = {true, std::min(all.low, one.low), std::max(all.high, one.high)};
         }
       }
       return all;

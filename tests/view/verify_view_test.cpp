@@ -29,12 +29,6 @@ std::string text_of(const ViewReport& report) {
   return text;
 }
 
-ViewChecks quick() {
-  ViewChecks options;
-  options.fractions.clear();
-  return options;
-}
-
 class VerifyViewTest : public test::GlTest {};
 
 TEST_F(VerifyViewTest, PassesOnSoundTiles) {
@@ -77,7 +71,7 @@ TEST_F(VerifyViewTest, PassesOnOddShapes) {
 /// Every finding names the level at fault, and one of them is of the check that a person would look for.
 void expect_found(const IndexArrays& arrays, int id, int level, const std::string& what) {
   const MemoryTiles source(tiny_grid());
-  const ViewReport report = verify_view(source, arrays, quick());
+  const ViewReport report = verify_view(source, arrays);
   EXPECT_FALSE(report.passed()) << what;
   const bool named = std::any_of(report.findings.begin(), report.findings.end(), [&](const ViewFinding& finding) {
     return finding.id == id && finding.level == level;
@@ -155,7 +149,7 @@ void expect_tile_found(const MemoryTiles::Alter& alter, int id, const std::strin
   const MemoryTiles source(tiny_grid(), [&](TileIndex tile, std::vector<std::uint16_t>& codes) {
     if (tile == bad) alter(tile, codes);
   });
-  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick());
+  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()));
   EXPECT_TRUE(std::any_of(report.findings.begin(), report.findings.end(),
                           [&](const ViewFinding& finding) { return finding.id == id; }))
       << what << "\n"
@@ -210,7 +204,7 @@ void expect_shadows_found(const std::function<void(std::span<float>)>& spoil, co
   source.set_heights([&](TileIndex tile, std::span<float> heights) {
     if (tile == TileIndex{1, 1}) spoil(heights);
   });
-  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()), quick());
+  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()));
   EXPECT_FALSE(report.passed()) << what;
   for (const ViewFinding& finding : report.findings) {
     EXPECT_EQ(finding.id, finding::kDrawnShadow) << what;

@@ -1,6 +1,5 @@
 #include "gl/offscreen.h"
 
-#include <epoxy/egl.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,22 +13,6 @@
 #include "isohf/error.h"
 
 namespace isohf::view {
-
-struct HeadlessContext::State {
-  EGLDisplay display = EGL_NO_DISPLAY;
-  EGLContext context = EGL_NO_CONTEXT;
-
-  State() = default;
-  State(const State&) = delete;
-  State& operator=(const State&) = delete;
-  ~State() {
-    if (display == EGL_NO_DISPLAY) return;
-    eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
-    if (context != EGL_NO_CONTEXT) eglDestroyContext(display, context);
-    eglTerminate(display);
-  }
-  void open(EGLDisplay where);
-};
 
 namespace {
 
@@ -74,25 +57,33 @@ std::vector<EGLDisplay> possible_displays() {
 
 }  // namespace
 
-/// Makes the context there and uses it.
-void HeadlessContext::State::open(EGLDisplay where) {
+void HeadlessContext::close() {
+  if (display_ == EGL_NO_DISPLAY) return;
+  eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  if (context_ != EGL_NO_CONTEXT) eglDestroyContext(display_, context_);
+  eglTerminate(display_);
+  display_ = EGL_NO_DISPLAY;
+  context_ = EGL_NO_CONTEXT;
+}
+
+void HeadlessContext::open(EGLDisplay where) {
   if (where == EGL_NO_DISPLAY || eglInitialize(where, nullptr, nullptr) != EGL_TRUE) {
     throw refusal("EGL offers no display");
   }
-  display = where;
+  display_ = where;
   if (eglBindAPI(EGL_OPENGL_API) != EGL_TRUE) throw refusal("EGL does not offer desktop OpenGL");
   const std::array<EGLint, 5> wanted{EGL_SURFACE_TYPE, 0, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
   EGLConfig config = nullptr;
   EGLint count = 0;
-  if (eglChooseConfig(display, wanted.data(), &config, 1, &count) != EGL_TRUE || count < 1) {
+  if (eglChooseConfig(display_, wanted.data(), &config, 1, &count) != EGL_TRUE || count < 1) {
     throw refusal("EGL has no OpenGL configuration");
   }
   const std::array<EGLint, 7> version{
       EGL_CONTEXT_MAJOR_VERSION,           3,       EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK,
       EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
-  context = eglCreateContext(display, config, EGL_NO_CONTEXT, version.data());
-  if (context == EGL_NO_CONTEXT) throw refusal("the driver makes no OpenGL 3.3 core context");
-  if (eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context) != EGL_TRUE) {
+  context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, version.data());
+  if (context_ == EGL_NO_CONTEXT) throw refusal("the driver makes no OpenGL 3.3 core context");
+  if (eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) != EGL_TRUE) {
     throw refusal("the context cannot be used without a surface");
   }
 }
@@ -100,20 +91,23 @@ void HeadlessContext::State::open(EGLDisplay where) {
 HeadlessContext::HeadlessContext() {
   const std::vector<EGLDisplay> displays = possible_displays();
   for (std::size_t i = 0; i < displays.size(); ++i) {
-    state_ = std::make_unique<State>();
     try {
-      state_->open(displays[i]);
+      open(displays[i]);
       return;
     } catch (const Error&) {
+      close();
       if (i + 1 == displays.size()) throw;
     }
   }
 }
 
-HeadlessContext::~HeadlessContext() = default;
+HeadlessContext::~HeadlessContext() {
+  close();
+}
 
 std::string driver_name() {
-  return reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  const GLubyte* name = glGetString(GL_RENDERER);
+  return name == nullptr ? "unknown" : reinterpret_cast<const char*>(name);
 }
 
 bool is_software_driver() {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <epoxy/egl.h>
+
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -21,8 +23,12 @@ class HeadlessContext {
   HeadlessContext& operator=(const HeadlessContext&) = delete;
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  /// Makes the context there and uses it.
+  void open(EGLDisplay where);
+  void close();
+
+  EGLDisplay display_ = EGL_NO_DISPLAY;
+  EGLContext context_ = EGL_NO_CONTEXT;
 };
 
 /// Samples a pixel, of pictures and windows.

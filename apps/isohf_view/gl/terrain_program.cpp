@@ -194,13 +194,11 @@ void main() {
 )glsl";
 
 constexpr const char* kProbeFragment = R"glsl(
-in vec4 v_facing;
 in vec4 v_place;
 out vec4 probe;
-uniform float alpha;
 void main() {
   DISCARD_VOID;
-  probe = vec4(v_place.z, v_facing.x, v_facing.z, alpha);
+  probe = vec4(v_place.z, 0.0, 0.0, 1.0);
 }
 )glsl";
 

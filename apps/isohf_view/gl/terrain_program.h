@@ -13,7 +13,7 @@ namespace isohf::view {
 
 /// Fragment shaders for the terrain; they discard voids. Light, colours and haze: one for each mode.
 [[nodiscard]] std::string terrain_fragment_shader(ColourMode mode);
-/// (elevation code, normal x, normal z, 1): what verifying reads back.
+/// (elevation code, 0, 0, 1): what verifying reads back.
 [[nodiscard]] std::string probe_fragment_shader();
 /// One flat colour: wireframes.
 [[nodiscard]] std::string flat_fragment_shader();

@@ -53,21 +53,18 @@ IndexArrays make_index_arrays(const TileShape& shape, int plane_stride) {
 }
 
 SharedGeometry::SharedGeometry(const TileShape& shape, const IndexArrays& arrays) : shape_(shape) {
-  const bool fits_16_bits = shape.stored_vertex_count() <= 65536;
-  index_type_ = fits_16_bits ? GL_UNSIGNED_SHORT : GL_UNSIGNED_INT;
-  const std::size_t index_bytes = fits_16_bits ? 2 : 4;
-
+  constexpr std::size_t kIndexBytes = sizeof(std::uint32_t);
   std::vector<std::uint32_t> all;
   for (const auto& strip : arrays.strips) {
-    strip_offsets_bytes_.push_back(all.size() * index_bytes);
+    strip_offsets_bytes_.push_back(all.size() * kIndexBytes);
     strip_counts_.push_back(static_cast<GLsizei>(strip.size()));
     all.insert(all.end(), strip.begin(), strip.end());
   }
-  stitch_offset_bytes_ = all.size() * index_bytes;
+  stitch_offset_bytes_ = all.size() * kIndexBytes;
   for (const std::size_t count : arrays.stitch_counts) stitch_counts_.push_back(static_cast<GLsizei>(count));
   all.insert(all.end(), arrays.stitch.begin(), arrays.stitch.end());
   for (const auto& side : arrays.sides) {
-    side_offsets_bytes_.push_back(all.size() * index_bytes);
+    side_offsets_bytes_.push_back(all.size() * kIndexBytes);
     side_counts_.push_back(static_cast<GLsizei>(side.size()));
     all.insert(all.end(), side.begin(), side.end());
   }
@@ -77,40 +74,32 @@ SharedGeometry::SharedGeometry(const TileShape& shape, const IndexArrays& arrays
   upload_static(GL_ARRAY_BUFFER, object_places(shape));
   // The element array belongs to a vertex array's state: fill the buffer through another target.
   glBindBuffer(GL_COPY_WRITE_BUFFER, indices_.get());
-  if (fits_16_bits) {
-    upload_static(GL_COPY_WRITE_BUFFER, std::vector<std::uint16_t>(all.begin(), all.end()));
-  } else {
-    upload_static(GL_COPY_WRITE_BUFFER, all);
-  }
+  upload_static(GL_COPY_WRITE_BUFFER, all);
   check_gl("uploading the shared vertex and index arrays");
 }
 
 void SharedGeometry::draw_strip(int level) const {
   const auto i = static_cast<std::size_t>(level);
-  glDrawElements(GL_TRIANGLE_STRIP, strip_counts_[i], index_type_, offset_pointer(strip_offsets_bytes_[i]));
+  glDrawElements(GL_TRIANGLE_STRIP, strip_counts_[i], GL_UNSIGNED_INT, offset_pointer(strip_offsets_bytes_[i]));
 }
 
 void SharedGeometry::draw_stitch(int level) const {
-  glDrawElements(GL_TRIANGLES, stitch_counts_[static_cast<std::size_t>(level)], index_type_,
+  glDrawElements(GL_TRIANGLES, stitch_counts_[static_cast<std::size_t>(level)], GL_UNSIGNED_INT,
                  offset_pointer(stitch_offset_bytes_));
 }
 
 std::int64_t SharedGeometry::draw_side(int side) const {
   const auto i = static_cast<std::size_t>(side);
-  glDrawElements(GL_TRIANGLES, side_counts_[i], index_type_, offset_pointer(side_offsets_bytes_[i]));
+  glDrawElements(GL_TRIANGLES, side_counts_[i], GL_UNSIGNED_INT, offset_pointer(side_offsets_bytes_[i]));
   return side_counts_[i] / 3;
 }
 
 std::vector<std::uint32_t> SharedGeometry::read(std::size_t offset_bytes, GLsizei count) const {
   glBindBuffer(GL_COPY_READ_BUFFER, indices_.get());
-  const auto read_as = [&](auto indices) -> std::vector<std::uint32_t> {
-    glGetBufferSubData(GL_COPY_READ_BUFFER, static_cast<GLintptr>(offset_bytes),
-                       static_cast<GLsizeiptr>(indices.size() * sizeof(indices[0])), indices.data());
-    return {indices.begin(), indices.end()};
-  };
-  const auto size = static_cast<std::size_t>(count);
-  return index_type_ == GL_UNSIGNED_INT ? read_as(std::vector<std::uint32_t>(size))
-                                        : read_as(std::vector<std::uint16_t>(size));
+  std::vector<std::uint32_t> indices(static_cast<std::size_t>(count));
+  glGetBufferSubData(GL_COPY_READ_BUFFER, static_cast<GLintptr>(offset_bytes),
+                     static_cast<GLsizeiptr>(indices.size() * sizeof(indices[0])), indices.data());
+  return indices;
 }
 
 std::vector<std::uint32_t> SharedGeometry::read_strip(int level) const {

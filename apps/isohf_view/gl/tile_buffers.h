@@ -22,7 +22,7 @@ struct IndexArrays {
 [[nodiscard]] IndexArrays make_index_arrays(const TileShape& shape, int plane_stride = 0);
 
 /// What all tiles of one shape share on the GPU (paper section 3.2): the object-space (x, z) of every stored vertex as
-/// GL_SHORT pairs, and the index arrays of all levels in one buffer, 16 bits an index where they fit.
+/// GL_SHORT pairs, and the index arrays of all levels in one buffer.
 class SharedGeometry {
  public:
   SharedGeometry(const TileShape& shape, const IndexArrays& arrays);
@@ -47,7 +47,6 @@ class SharedGeometry {
   TileShape shape_;
   Buffer xz_;
   Buffer indices_;
-  GLenum index_type_;
   std::vector<GLsizei> strip_counts_;
   std::vector<std::size_t> strip_offsets_bytes_;
   std::vector<GLsizei> stitch_counts_;

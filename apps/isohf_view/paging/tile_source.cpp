@@ -150,11 +150,10 @@ class ArchiveSource final : public TileSource {
     const TileEntry entry = reader_.tile_entry(tile, plane);
     if (!entry.stored) return {};
     if (is_float()) {
-      return {true, entry.has_voids, std::bit_cast<float>(entry.code_min) * world_per_elevation(),
+      return {true, std::bit_cast<float>(entry.code_min) * world_per_elevation(),
               std::bit_cast<float>(entry.code_max) * world_per_elevation()};
     }
-    return {true, entry.has_voids, scale().offset + scale().scale * entry.code_min,
-            scale().offset + scale().scale * entry.code_max};
+    return {true, scale().offset + scale().scale * entry.code_min, scale().offset + scale().scale * entry.code_max};
   }
 
   [[nodiscard]] bool is_float() const { return reader_.metadata().quantisation.type == CodeType::kF32; }
@@ -263,13 +262,12 @@ TileBounds find_whole_bounds(const TileSource& source_of_tiles) {
   // The coarsest plane knows of all that lies below.
   const Planes* planes = source_of_tiles.planes();
   const TileSource& source = planes == nullptr ? source_of_tiles : source_of_tiles.plane(planes->count());
-  TileBounds whole{false, false, std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  TileBounds whole{false, std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   const TileGrid& grid = source.grid();
   for (std::int64_t flat = 0; flat < grid.tile_count(); ++flat) {
     const TileBounds tile = source.bounds(grid.tile_at(flat));
     if (!tile.stored) continue;
     whole.stored = true;
-    whole.has_voids |= tile.has_voids;
     whole.low = std::min(whole.low, tile.low);
     whole.high = std::max(whole.high, tile.high);
   }

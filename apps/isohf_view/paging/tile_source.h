@@ -37,8 +37,7 @@ struct ViewScale {
 /// What is known of a tile before it is read.
 struct TileBounds {
   bool stored = false;  ///< false: wholly void
-  bool has_voids = false;
-  double low = 0.0;  ///< world units
+  double low = 0.0;     ///< world units
   double high = 0.0;
 };
 

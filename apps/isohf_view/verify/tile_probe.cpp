@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "renderer.h"
-
 namespace isohf::view {
 namespace {
 
@@ -25,60 +23,32 @@ TileProbe::TileProbe(const TileGrid& grid, const SharedGeometry& shared, double 
   frame_.code_height = code_height;
 }
 
-void TileProbe::begin(const TerrainProgram& program, const PixelWindow& window) {
-  // Straight down, North up: clip x and y from x and -z, nearer where higher.
+void TileProbe::draw_level(const TileSlot& slot, int level, const PixelWindow& window, std::vector<float>& out) {
+  // Straight down, North up: clip x and y from x and -z.
   Mat4 clip;
   clip.at(0, 0) = 2.0 * kPixelsPerX / (grid_.sigma_x() * target_.width());
   clip.at(0, 3) = -2.0 * window.x0 / target_.width() - 1.0;
   clip.at(1, 2) = -2.0 * kPixelsPerZ / (grid_.sigma_z() * target_.height());
   clip.at(1, 3) = 2.0 * (window.z0 + window.height) / target_.height() - 1.0;
-  clip.at(2, 1) = 0.9 / (65535.0 * frame_.code_height);
-  clip.at(2, 3) = 0.05;
   clip.at(3, 3) = 1.0;
   frame_.clip_from_eye = clip;
   target_.bind();
   glViewport(0, 0, target_.width(), target_.height());
   glClearColor(0.0F, 0.0F, 0.0F, 0.0F);
-  glDepthMask(GL_TRUE);
-  glClearDepth(0.0);
-  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  glClear(GL_COLOR_BUFFER_BIT);
   glFrontFace(GL_CCW);
   glCullFace(GL_BACK);
-  program.begin(grid_, frame_);
-  program.set_tile(grid_, frame_, {0, 0});
-  glUniform1f(program.uniform("alpha"), 1.0F);
-}
-
-void TileProbe::draw_mesh(const TileSlot& slot, int level) {
+  height_.begin(grid_, frame_);
+  height_.set_tile(grid_, frame_, {0, 0});
   slot.bind();
+  glDisable(GL_DEPTH_TEST);
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ONE, GL_ONE);
   glEnable(GL_CULL_FACE);
   shared_.draw_strip(level);
   glDisable(GL_CULL_FACE);
   if (shared_.has_stitch(level)) shared_.draw_stitch(level);
-}
-
-void TileProbe::draw_level(const TileSlot& slot, int level, const PixelWindow& window, std::vector<float>& out) {
-  begin(height_, window);
-  glDisable(GL_DEPTH_TEST);
-  glEnable(GL_BLEND);
-  glBlendFunc(GL_ONE, GL_ONE);
-  draw_mesh(slot, level);
   glDisable(GL_BLEND);
-  target_.read_rgba32f(out);
-}
-
-void TileProbe::draw_blend(const TileSlot& slot, const LodBlend& blend, const PixelWindow& window,
-                           std::vector<float>& out) {
-  begin(height_, window);
-  begin_opaque_pass();
-  draw_mesh(slot, blend.first);
-  if (blend.alpha > 0.0 && blend.second != blend.first) {
-    begin_fading_pass();
-    order_fading(blend);
-    glUniform1f(height_.uniform("alpha"), static_cast<float>(blend.alpha));
-    draw_mesh(slot, blend.second);
-    end_fading_pass();
-  }
   target_.read_rgba32f(out);
 }
 

@@ -6,7 +6,6 @@
 #include "gl/offscreen.h"
 #include "gl/terrain_program.h"
 #include "gl/tile_buffers.h"
-#include "isohf/lattice/lod.h"
 #include "verify/mesh_oracle.h"
 
 namespace isohf::view {
@@ -18,23 +17,18 @@ struct ProbedVertex {
   float object_x, object_z, code, shadow;
 };
 
-/// Draws a tile from straight above with the terrain's vertex shader into floats: (code, normal x, normal z, count).
+/// Draws a tile from straight above with the terrain's vertex shader into floats: (code, 0, 0, count).
 class TileProbe {
  public:
   TileProbe(const TileGrid& grid, const SharedGeometry& shared, double code_height);
 
   /// Strip and stitch of one level, added up, without back faces. Rows from the South.
   void draw_level(const TileSlot& slot, int level, const PixelWindow& window, std::vector<float>& out);
-  /// The two-stage transition, by the same passes as pictures.
-  void draw_blend(const TileSlot& slot, const LodBlend& blend, const PixelWindow& window, std::vector<float>& out);
   /// All stored vertices, drawn as those of `tile`; padding gets no sensible normal.
   void capture(const TileSlot& slot, TileIndex tile, std::vector<ProbedVertex>& out);
   [[nodiscard]] int width() const { return target_.width(); }  ///< pixels of a row of the pictures
 
  private:
-  void begin(const TerrainProgram& program, const PixelWindow& window);
-  void draw_mesh(const TileSlot& slot, int level);
-
   const TileGrid& grid_;
   const SharedGeometry& shared_;
   TerrainFrame frame_;

@@ -5,7 +5,6 @@
 #include <unordered_map>
 
 #include "isohf/error.h"
-#include "isohf/lattice/lod.h"
 #include "isohf/light/normals.h"
 #include "verify/verify_view.h"
 
@@ -44,7 +43,6 @@ class TileVerifier {
   void check_vertices(TileIndex tile);
   void check_shared(TileIndex tile);
   void check_level(TileIndex tile, int level, const PixelWindow& window);
-  void check_transition(TileIndex tile, double level, const PixelWindow& window);
 
   const CheckContext& context_;
   const TileSource& source_;
@@ -80,9 +78,6 @@ void TileVerifier::verify(TileIndex tile) {
   const int levels = shape.levels();
   for (const PixelWindow& window : context_.oracle.windows()) {
     for (int level = 0; level < levels; ++level) check_level(tile, level, window);
-    for (int level = 0; level + 1 < levels; ++level) {
-      for (const double fraction : context_.options.fractions) check_transition(tile, level + fraction, window);
-    }
   }
 }
 
@@ -181,7 +176,6 @@ void TileVerifier::check_level(TileIndex tile, int level, const PixelWindow& win
   ++report_.pictures;
   Worst coverage;
   Worst height;
-  Worst normal;
   const double reach = window.x0 + window.z0 + window.width + window.height;
   for_each_pixel(window, probe_.width(), [&](int i, int j, std::size_t k, std::size_t at) {
     const PixelSample& sample = samples[k];
@@ -205,54 +199,9 @@ void TileVerifier::check_level(TileIndex tile, int level, const PixelWindow& win
                            want.code);
       });
     }
-    double nx = 0.0;
-    double nz = 0.0;
-    for (std::size_t corner = 0; corner < 3; ++corner) {
-      const Normal& there = normals_[sample.vertices[corner]];
-      nx += static_cast<double>(sample.weights[corner]) * there.x;
-      nz += static_cast<double>(sample.weights[corner]) * there.z;
-    }
-    const double turn = std::max(std::abs(got[1] - nx), std::abs(got[2] - nz));
-    report_.worst_normal = std::max(report_.worst_normal, turn);
-    if (turn > kNormalTolerance + 2.0 * reach * kPerPixel) {
-      normal.add(turn, [&] {
-        return fmt::format("{}: normal x, z ({:.5f}, {:.5f}), library ({:.5f}, {:.5f})",
-                           pixel_name(shape, window, i, j, sample), got[1], got[2], nx, nz);
-      });
-    }
   });
   coverage.report(report_, finding::kDrawnCoverage, tile, level);
   height.report(report_, finding::kDrawnHeight, tile, level);
-  normal.report(report_, finding::kDrawnNormal, tile, level);
-}
-
-void TileVerifier::check_transition(TileIndex tile, double level, const PixelWindow& window) {
-  const TileShape& shape = source_.grid().shape();
-  const LodBlend blend = lod_blend(level, shape.levels());
-  const std::span<const PixelSample> first_kept = context_.oracle.samples(blend.first, window);
-  const std::vector<PixelSample> first(first_kept.begin(), first_kept.end());
-  const std::span<const PixelSample> second = context_.oracle.samples(blend.second, window);
-  probe_.draw_blend(slot_, blend, window, pixels_);
-  ++report_.pictures;
-  Worst worst;
-  const double reach = window.x0 + window.z0 + window.width + window.height;
-  for_each_pixel(window, probe_.width(), [&](int i, int j, std::size_t k, std::size_t at) {
-    const SampledCode under = sample_code(first[k], codes_);
-    const SampledCode over = sample_code(second[k], codes_);
-    if (!under.valid || !over.valid) return;
-    ++report_.pixels;
-    const double want = under.code + blend.alpha * std::max(over.code - under.code, 0.0);
-    const double got = pixels_[at];
-    const double off = std::abs(got - want);
-    report_.worst_height = std::max(report_.worst_height, off);
-    if (off <= 2.0 * kCodeTolerance + (under.spread + over.spread) * reach * kPerPixel) return;
-    worst.add(off, [&] {
-      return fmt::format("{}: code {:.3f}, required {:.3f} (levels {} at {:.3f} and {} at {:.3f}, alpha {:.2f})",
-                         pixel_name(shape, window, i, j, first[k]), got, want, blend.first, under.code, blend.second,
-                         over.code, blend.alpha);
-    });
-  });
-  worst.report(report_, finding::kDrawnTransition, tile, level);
 }
 
 }  // namespace

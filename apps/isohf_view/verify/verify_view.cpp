@@ -52,7 +52,7 @@ std::string check_name(int id) {
       {finding::kTileUndecodable, "readable"}, {finding::kSharedVertex, "shared vertices"},
       {finding::kNormal, "shared vertices"},   {finding::kDrawnVertex, "vertices"},
       {finding::kDrawnCoverage, "coverage"},   {finding::kDrawnHeight, "heights"},
-      {finding::kDrawnNormal, "normals"},      {finding::kDrawnTransition, "transitions"},
+
       {finding::kDrawnCrack, "cracks"},        {finding::kDrawnMesh, "mesh"},
       {finding::kDrawnShadow, "shadows"}};
   return kNames.at(id);

@@ -25,7 +25,6 @@ struct ViewFinding {
 };
 
 struct ViewChecks {
-  std::vector<double> fractions{0.25, 0.5, 0.8};  ///< β of the transitions looked at between each two levels
   bool shadows = true;
   /// Only these tiles, and the rows of their shadows.
   std::optional<TileRange> tiles;

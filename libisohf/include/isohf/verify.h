@@ -126,14 +126,10 @@ inline constexpr int kAccuracy = 25;
 // What drawing shows: isohf view --verify.
 inline constexpr int kDrawnVertex = 26;
 inline constexpr int kDrawnCoverage = 27;
-inline constexpr int kDrawnWinding = 28;
 inline constexpr int kDrawnHeight = 29;
-inline constexpr int kDrawnNormal = 30;
-inline constexpr int kDrawnTransition = 31;
 inline constexpr int kDrawnCrack = 32;
 inline constexpr int kDrawnMesh = 33;
 inline constexpr int kDrawnShadow = 34;
-inline constexpr int kDrawnSunShare = 35;
 // Coarse planes.
 inline constexpr int kPlane = 36;
 inline constexpr int kPlaneRange = 37;
