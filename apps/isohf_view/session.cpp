@@ -45,23 +45,6 @@ int worker_count(const Options& options) {
   return options.threads > 0 ? options.threads : std::max(1, cores - 1);
 }
 
-const std::vector<std::string> kHelpLines{"left drag    move the ground         wheel         zoom",
-                                          "right drag   orbit                   double click  fly there",
-                                          "W A S D      fly, arrows too         Q E           down, up",
-                                          "Shift, Ctrl  faster, slower          [ ]           far distance",
-                                          "Home         the whole terrain       R             first view",
-                                          "J L          turn the sun            I K           raise, lower it",
-                                          "O            sun of a day            , .           earlier, later",
-                                          "U            shadows                 X             wireframe",
-                                          "M            colours                 + -           exaggeration",
-                                          "Y            measure from, to        F             more, no figures",
-                                          "P            save a picture          H, Esc        help, quit"};
-
-const char* mode_name(ColourMode mode) {
-  constexpr const char* kNames[] = {"elevation", "levels of detail", "strip order", "texture", "normals"};
-  return kNames[static_cast<std::size_t>(mode)];
-}
-
 constexpr double kDegree = std::numbers::pi / 180.0;
 /// A sun that stands higher than this shades nothing to speak of.
 constexpr double kOverhead_deg = 89.5;
@@ -116,10 +99,9 @@ Session::Session(const TileSource& source, const Options& options)
   legend_ = {{}, whole_.low / source.world_per_elevation(), whole_.high / source.world_per_elevation()};
   if (const Metadata* metadata = source.metadata()) legend_.stops = shade_colours(*metadata, options.palette);
   renderer_.set_palette(legend_.stops, legend_.low, legend_.high);
-  driver_ = driver_name();
   if (options.date) begin_day(*options.date);
   Vec3 target;
-  camera = first_camera(target);
+  camera = overview_camera(source_, view, &target);
   if (options.position || options.look_at) {
     camera.look_at(options.position ? from_archive(*options.position) : camera.eye,
                    options.look_at ? from_archive(*options.look_at) : target);
@@ -161,22 +143,6 @@ void Session::set_hours(double hours) {
   const SunPlace sun = sky_->sun(*time_);
   sun_azimuth_deg = sun.azimuth_deg;
   sun_elevation_deg = sun.elevation_deg;
-}
-
-Camera Session::first_camera(Vec3& target) const {
-  Camera all = overview_camera(source_, view, &target);
-  // Where memory does not hold what that sees, stand nearer, over the middle.
-  const double needed = farthest_corner(source_.grid(), whole_, all.eye, view.exaggeration);
-  const double reach = boxes_.fitting_reach(needed);
-  if (reach < needed) {
-    const Vec3 way = -1.0 * all.forward();
-    const WorldBounds covered = source_.covered();
-    const Vec3 middle{0.5 * (covered.x0 + covered.x1), 0.5 * (whole_.low + whole_.high) * view.exaggeration,
-                      0.5 * (covered.z0 + covered.z1)};
-    target = middle;
-    all.look_at(middle + 0.3 * reach * way, middle);
-  }
-  return all;
 }
 
 void Session::prepare() {
@@ -227,13 +193,6 @@ void Session::complete_frame() {
   draw();
 }
 
-std::string Session::shadow_line() const {
-  if (!shadows) return "shadows off";
-  if (!view.shadows) return sun_elevation_deg > 0.0 ? "no shadows: the sun is overhead" : "no shadows: it is night";
-  const std::int64_t to_come = boxes_.figures().shadows_to_come;
-  return to_come > 0 ? fmt::format("shadows: {} tiles to come", to_come) : "shadows";
-}
-
 bool Session::is_settled() const {
   const TileBoxFigures& box = boxes_.figures();
   if (box.missing_tiles > 0 || box.shadows_to_come > 0) return false;
@@ -241,69 +200,49 @@ bool Session::is_settled() const {
   return textures_->figures().to_come == 0 && (!texture_overview_ || texture_overview_->is_whole());
 }
 
-void Session::draw_overlay(const Shown& shown) {
+Reading Session::reading(Figures figures, const std::optional<Vec3>& middle, double frames_per_second) const {
   Reading reading;
-  if (shown.help) reading.help = kHelpLines;
-  if (shown.figures != Figures::kNone) {
-    const TileBoxFigures& box = boxes_.figures();
-    const Vec3 eye = eye_in_archive();
-    std::vector<std::string>& lines = reading.figures;
-    if (shown.figures == Figures::kAll) {
-      lines = {fmt::format("{:5.1f} fps   {} triangles   {} draw calls", shown.frames_per_second,
-                           cli::describe_count(figures_.triangles), figures_.draw_calls),
-               fmt::format("{} tiles drawn, {} resident, {} to come, {:.1f} MiB", figures_.visible_tiles,
-                           box.resident_tiles, box.missing_tiles, static_cast<double>(box.resident_bytes) / (1 << 20)),
-               fmt::format("eye at x {:.7g}  y {:.0f}  z {:.7g}", eye.x, eye.y, eye.z),
-               fmt::format("colours: {}", mode_name(view.mode)),
-               shadow_line(),
-               driver_};
-      if (shows_textures()) {
-        const TextureBoxFigures& textures = textures_->figures();
-        lines.push_back(fmt::format("{} textures resident, {} to come, {:.1f} MiB", textures.resident, textures.to_come,
-                                    static_cast<double>(textures.resident_bytes) / (1 << 20)));
-      }
-    }
-    if (shown.figures != Figures::kLegend) {
-      lines.push_back(fmt::format("sun {:.0f}, {:.0f} deg   heights x {:.3g}   H: help", sun_azimuth_deg,
-                                  sun_elevation_deg, view.exaggeration));
-      if (time_) {
-        lines.push_back(fmt::format("{:04}-{:02}-{:02}, mean solar time", time_->year, time_->month, time_->day));
-      }
-      if (shows_textures() && textures_->error()) lines.push_back(*textures_->error());
-      if (cut_) lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
-      if (boxes_.error()) lines.push_back(*boxes_.error());
-    } else if (view.exaggeration != 1.0) {
-      lines.push_back(fmt::format("heights x {:.3g}", view.exaggeration));
-    }
-    lines.insert(lines.end(), shown.place.begin(), shown.place.end());
-    if (view.mode == ColourMode::kElevation) reading.colours = legend_.stops;
-    reading.low = legend_.low;
-    reading.high = legend_.high;
-    reading.height_unit = source_.height_unit();
-    reading.ground_unit = source_.ground_unit();
-    reading.world_per_px = shown.middle_distance / view.focal_px();
-    reading.heading_rad = camera.heading_rad;
+  if (figures == Figures::kNone) return reading;
+  const TileBoxFigures& box = boxes_.figures();
+  const Vec3 eye = eye_in_archive();
+  std::vector<std::string>& lines = reading.figures;
+  if (figures == Figures::kAll) {
+    lines = {fmt::format("{:5.1f} fps   {} triangles", frames_per_second, cli::describe_count(figures_.triangles)),
+             fmt::format("{} tiles drawn, {} resident, {} to come, {:.1f} MiB", figures_.visible_tiles,
+                         box.resident_tiles, box.missing_tiles, static_cast<double>(box.resident_bytes) / (1 << 20)),
+             fmt::format("eye at x {:.7g}  y {:.0f}  z {:.7g}", eye.x, eye.y, eye.z), driver_name()};
   }
-  if (shown.figures != Figures::kLegend) reading.hours = hours();
-  reading.profile = shown.profile;
-  for (const Vec3 at : shown.way) reading.way.push_back(project(camera, view, at));
-  hud_.draw(reading, view.width, view.height, shown.screen_scale);
+  if (figures != Figures::kLegend) {
+    lines.push_back(fmt::format("sun {:.0f}, {:.0f} deg   heights x {:.3g}   H: help", sun_azimuth_deg,
+                                sun_elevation_deg, view.exaggeration));
+    if (time_) {
+      lines.push_back(fmt::format("{:04}-{:02}-{:02}, mean solar time", time_->year, time_->month, time_->day));
+    }
+    if (shows_textures() && textures_->error()) lines.push_back(*textures_->error());
+    if (cut_) lines.push_back(fmt::format("far distance cut to {:.0f} by --memory", box.radius));
+    if (boxes_.error()) lines.push_back(*boxes_.error());
+    reading.hours = hours();
+  } else if (view.exaggeration != 1.0) {
+    lines.push_back(fmt::format("heights x {:.3g}", view.exaggeration));
+  }
+  if (view.mode == ColourMode::kElevation) reading.colours = legend_.stops;
+  reading.low = legend_.low;
+  reading.high = legend_.high;
+  reading.height_unit = source_.height_unit();
+  reading.ground_unit = source_.ground_unit();
+  reading.world_per_px = middle ? true_distance(*middle) / view.focal_px() : 0.0;
+  reading.heading_rad = camera.heading_rad;
+  return reading;
 }
 
 void Session::keep(const Offscreen& picture, const Options& options, const std::string& path) {
   picture.bind_joined();
-  if (options.legend) draw_legend();
+  if (options.legend) {
+    Ground ground(source_);
+    const auto middle = Steering(source_, ground, camera, view).middle();
+    draw_overlay(reading(Figures::kLegend, middle, 0.0), std::max(1.0, std::min(view.width, view.height) / 720.0));
+  }
   write_picture(path, picture.width(), picture.height(), options.overwrite);
-}
-
-void Session::draw_legend() {
-  Ground ground(source_);
-  Shown shown;
-  shown.figures = Figures::kLegend;
-  const auto middle = Steering(source_, ground, camera, view).middle();
-  if (middle) shown.middle_distance = true_distance(*middle);
-  shown.screen_scale = std::max(1.0, std::min(view.width, view.height) / 720.0);
-  draw_overlay(shown);
 }
 
 double Session::true_distance(Vec3 at) const {

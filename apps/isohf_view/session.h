@@ -33,24 +33,16 @@ class Session {
   void complete_frame();
   /// Changes the far distance by a factor.
   void scale_far(double factor) { far_distance_ = view.far_distance * factor; }
-  /// What a person reads over the frame.
-  /// kLegend: scale bar, North arrow and colours; kPlace: what a person asks the ground too; kAll: how it is drawn as well
+  /// What a person reads over the frame: kLegend: scale bar, North arrow and colours; kPlace: what a person asks the ground too; kAll: how it is drawn as well
   enum class Figures { kNone, kLegend, kPlace, kAll };
-  struct Shown {
-    double frames_per_second = 0.0;
-    Figures figures = Figures::kPlace;
-    bool help = false;
-    std::vector<std::string> place;  ///< under the cursor
-    double middle_distance = 0.0;    ///< of the ground in the middle of the picture, in true lengths; 0: there is none
-    std::optional<Profile> profile;
-    std::vector<Vec3> way;  ///< what is measured, as drawn
-    double screen_scale = 1.0;
-  };
-  void draw_overlay(const Shown& shown);
+  /// middle             of the picture, on the ground: where the scale bar holds; nullopt: there is none
+  /// frames_per_second  for kAll
+  [[nodiscard]] Reading reading(Figures figures, const std::optional<Vec3>& middle, double frames_per_second) const;
+  void draw_overlay(const Reading& reading, double screen_scale) {
+    hud_.draw(reading, view.width, view.height, screen_scale);
+  }
   /// Writes a picture that was drawn, with the legend alone where it is wanted.
   void keep(const Offscreen& picture, const Options& options, const std::string& path);
-  /// The distance from the eye as long as it is on the body.
-  [[nodiscard]] double true_distance(Vec3 at) const;
 
   /// A place of the archive's world, y without exaggeration, as drawn; and the eye's, back.
   [[nodiscard]] Vec3 from_archive(Vec3 at) const;
@@ -87,11 +79,10 @@ class Session {
 
  private:
   void prepare();
-  void draw_legend();
   void draw();
-  [[nodiscard]] Camera first_camera(Vec3& target) const;
+  /// The distance from the eye as long as it is on the body.
+  [[nodiscard]] double true_distance(Vec3 at) const;
   [[nodiscard]] bool shows_textures() const { return textures_ && view.mode == ColourMode::kTexture; }
-  [[nodiscard]] std::string shadow_line() const;
 
   const TileSource& source_;
   TileBounds whole_;
@@ -106,7 +97,6 @@ class Session {
     std::vector<ColourStop> stops;
     double low, high;
   } legend_{};
-  std::string driver_;
   std::optional<DaySky> sky_;
   std::optional<SolarTime> time_;
   std::pair<double, double> sun_before_;  ///< the day: azimuth and elevation, degrees

@@ -38,6 +38,18 @@ std::string glfw_error() {
   return text == nullptr ? "unknown reason" : text;
 }
 
+const std::vector<std::string> kHelpLines{"left drag    move the ground         wheel         zoom",
+                                          "right drag   orbit                   double click  fly there",
+                                          "W A S D      fly, arrows too         Q E           down, up",
+                                          "Shift, Ctrl  faster, slower          [ ]           far distance",
+                                          "Home         the whole terrain       R             first view",
+                                          "J L          turn the sun            I K           raise, lower it",
+                                          "O            sun of a day            , .           earlier, later",
+                                          "U            shadows                 X             wireframe",
+                                          "M            colours                 + -           exaggeration",
+                                          "Y            measure from, to        F             more, no figures",
+                                          "P            save a picture          H, Esc        help, quit"};
+
 constexpr const char* kWithoutWindow = "; --screenshot PICTURE.png draws without one";
 
 /// GLFW and one window with a current OpenGL 3.3 core context.
@@ -126,18 +138,15 @@ class Controls {
     return reading ? Change::kReading : Change::kNone;
   }
 
-  /// What is under the cursor and what is measured; the rest is the caller's.
-  [[nodiscard]] Session::Shown shown() {
-    Session::Shown shown;
-    shown.figures = show_figures;
-    shown.help = show_help;
-    shown.screen_scale = screen_scale();
-    const auto middle = steering_.middle();
-    if (middle) shown.middle_distance = session_.true_distance(*middle);
+  /// With what is under the cursor, and what is measured.
+  [[nodiscard]] Reading reading(double frames_per_second) {
+    Reading reading = session_.reading(show_figures, steering_.middle(), frames_per_second);
+    if (show_help) reading.help = kHelpLines;
+    std::vector<std::string> lines;
+    if (!message.empty()) lines.push_back(message);
     const auto there = inside_ ? steering_.pick(cursor_) : std::nullopt;
-    if (!message.empty()) shown.place.push_back(message);
     if (there) {
-      for (std::string& line : lines_of(describe(*there))) shown.place.push_back(std::move(line));
+      for (std::string& line : lines_of(describe(*there))) lines.push_back(std::move(line));
     }
     const std::optional<Vec3> end = measured_to_ ? measured_to_ : there ? std::optional(true_place(*there)) : there;
     if (measured_from_ && end) {
@@ -145,15 +154,20 @@ class Controls {
       const Vec3 way = *end - *measured_from_;
       const double rise = way.y / source.world_per_elevation();
       const std::string unit = source.height_unit().empty() ? "" : fmt::format(" {}", short_unit(source.height_unit()));
-      shown.place.push_back(fmt::format(
+      lines.push_back(fmt::format(
           "{} away, {:.{}f}{} {}",
           describe_length(distance_between(source, {measured_from_->x, measured_from_->z}, {end->x, end->z}),
                           source.ground_unit()),
           std::abs(rise), source.describe({end->x, end->z}, end->y).decimals, unit, rise < 0.0 ? "lower" : "higher"));
     }
-    if (measured_from_) shown.way = measured_way(end);
-    shown.profile = profile_;
-    return shown;
+    if (measured_from_) {
+      for (const Vec3 at : measured_way(end)) reading.way.push_back(project(session_.camera, session_.view, at));
+    }
+    if (show_figures != Session::Figures::kNone) {
+      reading.figures.insert(reading.figures.end(), lines.begin(), lines.end());
+    }
+    reading.profile = profile_;
+    return reading;
   }
 
   /// As drawn: over the ground once both ends stand.
@@ -174,6 +188,12 @@ class Controls {
     return way;
   }
 
+  [[nodiscard]] double screen_scale() const {
+    float x = 1.0F;
+    float y = 1.0F;
+    glfwGetWindowContentScale(window_, &x, &y);
+    return std::max(1.0F, y);
+  }
   /// nullopt: no ground.
   [[nodiscard]] std::optional<Place> under_cursor() {
     const auto there = inside_ ? steering_.pick(cursor_) : std::nullopt;
@@ -230,12 +250,6 @@ class Controls {
     steering_.press(button == GLFW_MOUSE_BUTTON_LEFT ? Steering::Drag::kPan : Steering::Drag::kOrbit, cursor_);
   }
 
-  [[nodiscard]] double screen_scale() const {
-    float x = 1.0F;
-    float y = 1.0F;
-    glfwGetWindowContentScale(window_, &x, &y);
-    return std::max(1.0F, y);
-  }
   /// Under the cursor; nullopt beside the slider, or where there is none.
   [[nodiscard]] std::optional<double> slider_hours() const {
     if (!session_.hours()) return std::nullopt;
@@ -413,9 +427,7 @@ void run_window(const Options& options) {
       if (!options.common.quiet) cli::print_note(options.common, controls.message);
     }
     picture->show();
-    Session::Shown shown = controls.shown();
-    shown.frames_per_second = 1.0 / smooth_s;
-    session.draw_overlay(shown);
+    session.draw_overlay(controls.reading(1.0 / smooth_s), controls.screen_scale());
     glfwSwapBuffers(window.get());
   }
   if (!options.common.json) return;

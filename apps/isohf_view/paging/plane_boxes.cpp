@@ -73,10 +73,6 @@ void PlaneBoxes::finish(const ViewState& view, double reach, const std::function
   count();
 }
 
-double PlaneBoxes::fitting_reach(double reach) const {
-  return planes_.count() > 0 ? reach : boxes_.front()->fitting_radius(reach);
-}
-
 void PlaneBoxes::count() {
   figures_ = {};
   for (const auto& box : boxes_) {

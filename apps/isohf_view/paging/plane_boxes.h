@@ -33,8 +33,6 @@ class PlaneBoxes {
   /// Of all boxes together; `radius` is the coarsest one's.
   [[nodiscard]] const TileBoxFigures& figures() const { return figures_; }
   [[nodiscard]] const std::optional<std::string>& error() const { return error_; }
-  /// The reach that memory holds, of what is wanted.
-  [[nodiscard]] double fitting_reach(double reach) const;
 
  private:
   /// How far around the eye tiles of a plane are wanted; nullopt: none are.

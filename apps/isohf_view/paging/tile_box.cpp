@@ -94,16 +94,11 @@ TileIndex TileBox::tiles_across(double radius) const {
   return {count_for(grid.extent_x(), grid.tile_columns()), count_for(grid.extent_z(), grid.tile_rows())};
 }
 
-double TileBox::fitting_radius(double radius) const {
-  const double least = 1e-6 * source_.grid().extent_x();
-  while (!fits(tiles_across(radius)) && radius >= least) radius *= 0.98;
-  return radius;
-}
-
 /// A box that memory does not hold shrinks to one that it does; figures say so.
 void TileBox::move(WorldPoint centre, double radius) {
   const TileGrid& grid = source_.grid();
-  figures_.radius = fitting_radius(radius);
+  while (!fits(tiles_across(radius)) && radius >= 1e-6 * grid.extent_x()) radius *= 0.98;
+  figures_.radius = radius;
   const TileIndex across = tiles_across(figures_.radius);
   const auto first = [&](double place, double extent, std::int64_t count, std::int64_t all) {
     return static_cast<std::int64_t>(

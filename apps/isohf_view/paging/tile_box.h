@@ -61,9 +61,6 @@ class TileBox {
   void finish(
       WorldPoint centre, double radius, const std::function<void()>& poll = [] {});
 
-  /// `radius`, or the most that memory holds the tiles of.
-  [[nodiscard]] double fitting_radius(double radius) const;
-
   [[nodiscard]] const TileSlot* resident(TileIndex tile) const;
   [[nodiscard]] const TileRange& range() const { return range_; }
   [[nodiscard]] const TileBoxFigures& figures() const { return figures_; }
