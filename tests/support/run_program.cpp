@@ -153,10 +153,4 @@ std::string isohf_path() {
   return ISOHF_BIN_DIR "/isohf";
 }
 
-RunResult run_isohf(const std::vector<std::string>& arguments, const RunOptions& options) {
-  std::vector<std::string> command = {isohf_path()};
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  return run_program(command, options);
-}
-
 }  // namespace isohf::test

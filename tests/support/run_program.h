@@ -63,8 +63,10 @@ inline std::vector<std::string> with_more(std::vector<std::string> words, const 
 /// Runs a program to its end.
 RunResult run_program(const std::vector<std::string>& command, const RunOptions& options = {});
 
-/// Runs the isohf of this build.
+/// Runs a command of isohf: in this process, unless it is `view` or the options limit or close what only a process of its
+/// own has (run_isohf.cpp, with isohf_commands).
 RunResult run_isohf(const std::vector<std::string>& arguments, const RunOptions& options = {});
+/// The isohf of this build.
 std::string isohf_path();
 
 }  // namespace isohf::test
