@@ -9,9 +9,9 @@
 #include "formats/registry.h"
 #include "interrupt.h"
 #include "isohf/base/file.h"
+#include "isohf/base/memory/machine_memory.h"
 #include "isohf/convert.h"
 #include "isohf/error.h"
-#include "machine_memory.h"
 #include "output/standard_output.h"
 
 namespace isohf::view {
@@ -54,7 +54,7 @@ std::unique_ptr<ScratchArchive> convert_for_viewing(const Options& options) {
   Job job;
   job.scratch_folder = temporary_folder().string();
   job.threads = options.threads;
-  job.machine_bytes = cli::machine_memory_bytes();
+  job.machine_bytes = machine_memory_bytes();
   job.cancel = &cli::watch_interrupts();
   const std::unique_ptr<HeightSource> source = open_raster(options.archive, {});
   understand_ground(source->info(), request.plan.ground);

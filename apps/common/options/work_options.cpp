@@ -5,26 +5,21 @@
 
 #include "interrupt.h"
 #include "isohf/base/file.h"
-#include "machine_memory.h"
+#include "isohf/base/memory/machine_memory.h"
 #include "options/option_values.h"
 
 namespace isohf::cli {
-namespace {
-
-constexpr int kMaxThreads = 1024;
-
-}  // namespace
 
 void add_threads_option(CLI::App& line, int& threads) {
   group(line, "Work");
   option(line, "-j,--threads", "N", "Use 1 to 1024 threads; the result is the same [default: all cores]",
-         [&](const std::string& text) { threads = static_cast<int>(parse_whole_number(text, 1, kMaxThreads)); });
+         [&](const std::string& text) { threads = static_cast<int>(parse_whole_number(text, 1, 1024)); });
 }
 
 void add_work_options(CLI::App& line, WorkOptions& options, Common& common) {
   add_threads_option(line, options.threads);
   option(line, "--progress", "auto|plain|json|none",
-         "auto is a bar on a terminal, plain lines with -v, else nothing [default: auto]",
+         "Show progress: one line on a terminal, plain lines with -v, else nothing [default: auto]",
          [&](const std::string& text) {
            options.progress = static_cast<ProgressMode>(parse_word(text, {"auto", "plain", "json", "none"}));
            common.json_notes = options.progress == ProgressMode::kJson;

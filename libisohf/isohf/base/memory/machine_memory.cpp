@@ -1,4 +1,4 @@
-#include "machine_memory.h"
+#include "isohf/base/memory/machine_memory.h"
 
 #include <sys/resource.h>
 #include <unistd.h>
@@ -8,7 +8,7 @@
 #include <fstream>
 #include <string>
 
-namespace isohf::cli {
+namespace isohf {
 namespace {
 
 constexpr std::uint64_t kNoLimit = UINT64_MAX;
@@ -66,4 +66,4 @@ std::uint64_t machine_memory_bytes() {
   return least;
 }
 
-}  // namespace isohf::cli
+}  // namespace isohf
