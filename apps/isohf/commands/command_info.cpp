@@ -25,6 +25,7 @@
 #include "options/work_options.h"
 #include "output/accuracy_output.h"
 #include "output/json_output.h"
+#include "output/lattice_json.h"
 #include "output/raster_info.h"
 #include "output/standard_output.h"
 

@@ -16,6 +16,7 @@
 #include "options/describe.h"
 #include "output/accuracy_output.h"
 #include "output/json_output.h"
+#include "output/lattice_json.h"
 #include "output/report.h"
 #include "output/standard_output.h"
 

@@ -1,6 +1,4 @@
-#include "output/json_output.h"
-
-#include <fmt/format.h>
+#include "output/lattice_json.h"
 
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -38,36 +36,6 @@ ordered_json json_from(const TileGrid& grid) {
 
 ordered_json json_from(const WorldBounds& bounds) {
   return {{"x0", bounds.x0}, {"z0", bounds.z0}, {"x1", bounds.x1}, {"z1", bounds.z1}};
-}
-
-namespace {
-
-/// Control characters that JSON would let through, U+007F to U+009F, as escapes.
-std::string without_controls(const std::string& text) {
-  std::string out;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    const auto next = i + 1 < text.size() ? static_cast<unsigned char>(text[i + 1]) : 0U;
-    if (byte == 0x7f) {
-      out += "\\u007f";
-    } else if (byte == 0xc2 && next >= 0x80 && next < 0xa0) {
-      out += fmt::format("\\u{:04x}", next);
-      ++i;
-    } else {
-      out += text[i];
-    }
-  }
-  return out;
-}
-
-}  // namespace
-
-std::string json_text(const ordered_json& document) {
-  return without_controls(document.dump(2, ' ', false, ordered_json::error_handler_t::replace)) + "\n";
-}
-
-std::string json_line(const ordered_json& document) {
-  return without_controls(document.dump(-1, ' ', false, ordered_json::error_handler_t::replace)) + "\n";
 }
 
 }  // namespace isohf::cli
