@@ -76,6 +76,7 @@ TextureBox::TextureBox(const TileSource& source, std::uint64_t memory_bytes, Wor
     : source_(source),
       levels_(source.textures()->levels),
       anisotropy_(best_anisotropy()),
+      in_flight_limit_(2 * workers.count()),
       memory_bytes_(memory_bytes),
       loader_([&source](const Request& request) { return load(source, request); }, workers) {
   // Half is for what is wanted; the rest holds one texture on its way.
@@ -177,6 +178,7 @@ void TextureBox::request() {
   std::stable_sort(due.begin(), due.end(), nearer);
   std::stable_sort(spare.begin(), spare.end(), nearer);
   for (Entry* entry : due) {
+    if (loader_.in_flight() >= in_flight_limit_) return;
     const std::uint64_t bytes = bytes_from(entry->wanted);
     const auto fits = [&] { return resident_bytes_ + kOnTheWay * (on_the_way_bytes_ + bytes) <= memory_bytes_; };
     for (; !fits() && on_the_way_bytes_ == 0 && !spare.empty(); spare.pop_back()) release(*spare.back());

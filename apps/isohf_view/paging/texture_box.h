@@ -86,6 +86,7 @@ class TextureBox {
   int levels_;
   int finest_ = 0;  ///< finer levels are too large for the memory that there is
   float anisotropy_;
+  std::size_t in_flight_limit_;  ///< tiles are not to wait behind many textures
   std::uint64_t memory_bytes_;
   std::uint64_t resident_bytes_ = 0;    ///< on the GPU
   std::uint64_t on_the_way_bytes_ = 0;  ///< of requests, until they are resident

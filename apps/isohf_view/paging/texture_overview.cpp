@@ -12,6 +12,7 @@ namespace {
 
 /// Texels of the whole on a side, at most: twice a screen's pixels.
 constexpr std::int64_t kMostTexels = 2048;
+constexpr std::size_t kRowsAhead = 2;
 
 }  // namespace
 
@@ -59,11 +60,13 @@ TextureOverview::TextureOverview(const TileSource& source, std::uint64_t memory_
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   glBindTexture(GL_TEXTURE_2D, 0);
-  for (; rows_to_come_ < rows; ++rows_to_come_) loader_.request(rows_to_come_);
+  rows_to_come_ = rows;
 }
 
 void TextureOverview::update(std::uint64_t upload_bytes) {
   if (is_whole()) return;
+  // Few at a time: tiles and their own textures come first.
+  while (next_row_ < source_.grid().tile_rows() && loader_.in_flight() < kRowsAhead) loader_.request(next_row_++);
   loader_.collect(waiting_);
   glBindTexture(GL_TEXTURE_2D, texture_.get());
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);

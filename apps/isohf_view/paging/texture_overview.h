@@ -39,6 +39,7 @@ class TextureOverview {
 
   const TileSource& source_;
   int level_ = 0;
+  std::int64_t next_row_ = 0;  ///< to ask for
   std::int64_t rows_to_come_ = 0;
   Texture texture_;
   std::deque<Strip> waiting_;
