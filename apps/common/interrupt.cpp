@@ -1,9 +1,10 @@
 #include "interrupt.h"
 
 #include <unistd.h>
+
 #include <csignal>
 
-#include "program.h"
+#include "common.h"
 
 namespace isohf::cli {
 namespace {
@@ -18,15 +19,10 @@ extern "C" void on_interrupt(int /*signal*/) {
 }  // namespace
 
 const std::atomic<bool>& watch_interrupts() {
-  struct sigaction action {};
-  action.sa_handler = on_interrupt;
-  sigemptyset(&action.sa_mask);
-  action.sa_flags = SA_RESTART;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-  // A terminal that goes away, unless nohup said that this is no reason.
-  struct sigaction before {};
-  if (sigaction(SIGHUP, nullptr, &before) == 0 && before.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+    // nohup ignores that a terminal goes away.
+    if (std::signal(number, on_interrupt) == SIG_IGN && number == SIGHUP) std::signal(number, SIG_IGN);
+  }
   return interrupted;
 }
 

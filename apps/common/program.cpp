@@ -30,23 +30,10 @@ namespace {
 /// For terminate handlers.
 const char* program_name = "isohf";
 
-/// What nothing can catch, as an exception where none may pass: one line, and no core file.
+/// Ends with one line, and no core file, for an exception where none may pass, or no memory to throw one.
 [[noreturn]] void end_in_one_line() noexcept {
-  const auto say = [](const char* text) { static_cast<void>(::write(STDERR_FILENO, text, std::strlen(text)) < 0); };
-  say(program_name);
-  try {
-    if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
-    // Nothing was thrown: there was no room to.
-    say(": ended early, most likely for lack of memory");
-  } catch (const std::bad_alloc&) {
-    say(": out of memory");
-  } catch (const std::exception& error) {
-    say(": ended early: ");
-    say(error.what());
-  } catch (...) {
-    say(": internal error");
-  }
-  say("\n");
+  for (const char* text : {program_name, ": ended early, most likely for lack of memory\n"})
+    static_cast<void>(::write(STDERR_FILENO, text, std::strlen(text)) < 0);
   ::_exit(kExitFailed);
 }
 
@@ -72,92 +59,145 @@ void add_common(CLI::App& root, Common& common) {
 }
 
 [[noreturn]] void refuse_usage(const CLI::App& line, const std::string& why) {
-  throw Error(ErrorCode::kInvalidArgument, fmt::format("{} ({} --help lists the options)", why, invocation(line)));
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("{} ({} --help lists the {})", why, invocation(line),
+                                                       line.get_subcommands({}).empty() ? "options" : "commands"));
+}
+
+/// The words as CLI11 has to read them. It takes "[a,b]" and "{}" for lists and "++" for an end of the command, it
+/// forgets what "--" means once a command has its arguments, and "--name=" takes the next word.
+std::vector<std::string> words_for_parser(const Arguments& arguments) {
+  std::vector<std::string> words;
+  const auto files = std::ranges::find(arguments, "--");
+  for (auto word = arguments.begin(); word != arguments.end(); ++word) {
+    if (word == files) continue;
+    const bool is_file = word > files && word->starts_with('-') && *word != "-";
+    const bool is_list = word->starts_with('[') && word->ends_with(']');
+    const bool is_empty = word < files && word->starts_with("--") && word->find('=') + 1 == word->size();
+    words.push_back(is_empty ? word->substr(0, word->size() - 1) : *word);
+    if (is_file || is_list || *word == "{}" || *word == "%%" || *word == "++") words.back().insert(0, "./");
+    if (is_empty) words.emplace_back();
+  }
+  return words;
+}
+
+/// A message of CLI11's.
+std::string in_plain_words(const CLI::App& line, const std::string& text) {
+  const auto before = [&](const char* mark) { return text.substr(0, text.find(mark)); };
+  if (text == "A subcommand is required") return "no command given";
+  if (text.ends_with(" is required")) {
+    const std::string name = before(" is required");
+    const CLI::Option* const option = line.get_option_no_throw(name);
+    return "no " + (option != nullptr && option->get_positional() ? option->get_name(true) : name) + " given";
+  }
+  if (text.find(": 1 required") != std::string::npos) return before(": 1 required") + " lacks its value";
+  if (text.ends_with(" was not readable (missing?)")) return "--config: " + before(" was not") + ": cannot be read";
+  const std::string flag = "Could not convert: ";
+  return text.starts_with(flag) ? before(" = ").substr(flag.size()) + " takes no value" : text;
 }
 
 /// Words that no option and no positional takes.
-[[noreturn]] void refuse_extras(const CLI::App& root, const CLI::App& line) {
+void refuse_extras(const CLI::App& root, const CLI::App& line) {
   const std::vector<std::string> extras = root.remaining(true);
-  const auto option = std::find_if(extras.begin(), extras.end(),
-                                   [](const std::string& word) { return word.size() > 1 && word.front() == '-'; });
-  if (option == extras.end()) {
-    if (&line == &root && root.get_require_subcommand_min() > 0) {
-      std::vector<std::string> names = {"help"};
-      for (const CLI::App* command : root.get_subcommands({})) names.push_back(command->get_name());
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("unknown command '{}'{} ({} --help lists the commands)", extras.front(),
-                              did_you_mean(extras.front(), names), root.get_name()));
-    }
-    refuse_usage(line, fmt::format("'{}' is one argument too many", extras.front()));
+  if (extras.empty()) return;
+  const auto option = std::ranges::find_if(extras, [](const auto& word) { return word.size() > 1 && word[0] == '-'; });
+  if (option != extras.end()) {
+    const std::string name = option->substr(0, option->find('='));
+    refuse_usage(line, fmt::format("unknown option {}{}", name, did_you_mean(name, long_names(line, root))));
   }
-  const std::string name = option->substr(0, option->find('='));
-  refuse_usage(line, fmt::format("unknown option {}{}", name, did_you_mean(name, long_names(line, root))));
+  const std::string& word = extras.front();
+  if (line.get_subcommands({}).empty()) refuse_usage(line, fmt::format("'{}' is one argument too many", word));
+  std::vector<std::string> names = {"help"};
+  for (const CLI::App* command : root.get_subcommands({})) names.push_back(command->get_name());
+  refuse_usage(line, fmt::format("unknown command '{}'{}", word, did_you_mean(word, names)));
 }
 
-/// Parses; throws Error for wrong usage. False if help or the version was printed.
-bool parse(CLI::App& root, const Arguments& arguments, const Common& common) {
+/// Throws Error for wrong usage, and CLI::Success where help or the version is requested.
+void parse(CLI::App& root, std::vector<std::string> words) {
   const auto config = std::make_shared<TomlConfig>(root);
   root.config_formatter(config);
-  const auto line = [&]() -> const CLI::App& {
-    const auto chosen = root.get_subcommands();
-    return chosen.empty() ? root : *chosen.front();
-  };
-  const auto print = [&](const std::string& text) {
-    StandardOutput out(common);
-    out.write_styled(text);
-    out.finish();
-    return false;
-  };
   try {
-    std::vector<std::string> words(arguments.rbegin(), arguments.rend());  // CLI11 takes the last one first
+    std::ranges::reverse(words);  // CLI11 takes the last one first
     root.parse(words);
-    return true;
-  } catch (const CLI::CallForVersion&) {
-    return print(common.json ? json_text({{"name", root.get_name()}, {"version", ISOHF_VERSION}})
-                             : root.get_name() + " " ISOHF_VERSION "\n");
-  } catch (const CLI::CallForHelp&) {
-    return print(root.help("", CLI::AppFormatMode::Normal));
-  } catch (const CLI::CallForAllHelp&) {
-    return print(root.help("", CLI::AppFormatMode::All));
   } catch (const BadValue& bad) {
     throw bad.error.within(config->place_of(bad.option));
-  } catch (const CLI::ExtrasError&) {
-    refuse_extras(root, line());
-  } catch (const CLI::RequiredError& error) {
-    if (&line() == &root && root.get_require_subcommand_min() > 0) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("no command given ({} --help lists the commands)", root.get_name()));
-    }
-    refuse_usage(line(), error.what());
+  } catch (const CLI::Success&) {
+    throw;
   } catch (const CLI::ParseError& error) {
-    refuse_usage(line(), error.what());
+    const auto chosen = root.get_subcommands();
+    const CLI::App& line = chosen.empty() ? root : *chosen.front();
+    refuse_extras(root, line);
+    refuse_usage(line, in_plain_words(line, error.what()));
   }
 }
 
-/// ISOHF_SIMD=off runs the plain twins of vectorised code, for tests and for finding faults.
-void choose_simd() {
-  const char* const setting = std::getenv("ISOHF_SIMD");
-  const std::string_view text = setting == nullptr ? "on" : setting;
-  if (text != "on" && text != "off") {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("the environment variable ISOHF_SIMD is '{}', must be on or off", text));
+int print(const Common& common, const std::string& text) {
+  StandardOutput out(common);
+  out.write_styled(text);
+  out.finish();
+  return kExitDone;
+}
+
+/// Becomes the program `name`, which is next to this one or on the path, with the same descriptors.
+[[noreturn]] void become_program(const std::string& name, const Arguments& arguments) {
+  std::vector<char*> words = {const_cast<char*>(name.c_str())};
+  for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
+  words.push_back(nullptr);
+  // What run_main() ignores would stay ignored.
+  std::signal(SIGPIPE, SIG_DFL);
+  std::signal(SIGXFSZ, SIG_DFL);
+  std::error_code unknown;
+  const std::filesystem::path here = std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path();
+  if (!unknown) ::execv((here / name).c_str(), words.data());
+  ::execvp(name.c_str(), words.data());
+  const std::string why =
+      errno == ENOENT ? "is not installed, neither beside isohf nor on the path" : std::strerror(errno);
+  throw Error(ErrorCode::kUnsupported, name + ": " + why);
+}
+
+/// A command that is another program gets all other words, as it is the only one to know their meaning.
+void run_other_program(const Program& program, const Arguments& arguments) {
+  auto word = arguments.begin();
+  for (; word != arguments.end() && word->starts_with('-'); ++word) {
+    if (*word == "--config" && word + 1 != arguments.end()) ++word;
   }
-  set_simd(text == "on");
+  for (const Command& command : program.commands) {
+    if (command.program == nullptr || word == arguments.end() || *word != command.name) continue;
+    Arguments others(arguments.begin(), word);
+    others.insert(others.end(), word + 1, arguments.end());
+    become_program(command.program, others);
+  }
 }
 
 int parse_and_run(const Program& program, Arguments arguments, Common& common) {
   // "help convert" is "convert --help".
-  if (program.has_commands() && !arguments.empty() && arguments.front() == "help") {
-    arguments.erase(arguments.begin());
-    arguments.emplace_back("--help");
-  }
-  choose_simd();
+  if (program.has_commands() && !arguments.empty() && arguments.front() == "help")
+    *std::rotate(arguments.begin(), arguments.begin() + 1, arguments.end()) = "--help";
+  run_other_program(program, arguments);
+  // The plain twins of vectorised code, for tests and for finding faults.
+  const char* const simd = std::getenv("ISOHF_SIMD");
+  set_simd(simd == nullptr || std::string_view(simd) != "off");
   CLI::App root(program.summary, program.name);
   const std::map<const CLI::App*, Run> runs = declare(program, root, common);
-  if (!parse(root, arguments, common)) return kExitDone;
-  const CLI::App* const line = program.has_commands() ? root.get_subcommands().front() : &root;
-  common.name = invocation(*line);
-  return runs.at(line)();
+  const auto line = [&]() -> const CLI::App& {
+    return root.get_subcommands().empty() ? root : *root.get_subcommands().front();
+  };
+  const std::vector<std::string> words = words_for_parser(arguments);
+  const auto has = [&](const char* option) { return std::ranges::find(words, option) != words.end(); };
+  const auto help = [&] { return root.help("", has("--help") ? CLI::AppFormatMode::All : CLI::AppFormatMode::Normal); };
+  try {
+    parse(root, words);
+  } catch (const CLI::CallForVersion&) {
+    return print(common, common.json ? json_text({{"name", program.name}, {"version", ISOHF_VERSION}})
+                                     : fmt::format("{} {}\n", program.name, ISOHF_VERSION));
+  } catch (const CLI::Success&) {
+    return print(common, help());
+  } catch (const Error&) {
+    common.name = invocation(line());
+    if (has("-h") || has("--help")) return print(common, help());
+    throw;
+  }
+  common.name = invocation(line());
+  return runs.at(&line())();
 }
 
 }  // namespace
@@ -179,6 +219,11 @@ std::map<const CLI::App*, Run> declare(const Program& program, CLI::App& root, C
   for (const Command& command : program.commands) {
     CLI::App& line = program.has_commands() ? *root.add_subcommand(command.name, command.summary) : root;
     if (program.has_commands()) line.group(command.heading)->footer("");
+    if (command.program != nullptr) {
+      line.set_help_flag();
+      line.set_help_all_flag();
+      continue;
+    }
     group(line, "Arguments");
     runs[&line] = command.add(line, common);
   }
@@ -203,7 +248,8 @@ int run(const Program& program, const Arguments& arguments, Common common) {
                          Error(ErrorCode::kOutOfMemory, "the system lets no more threads start; give fewer, as -j 1"),
                          kExitFailed);
     }
-    return print_internal_error(common, error.what());
+    return print_error(common, Error(ErrorCode::kUnsupported, std::string("internal error: ") + error.what()),
+                       kExitFailed);
   }
 }
 
@@ -224,22 +270,6 @@ int run_main(const Program& program, int argc, char** argv) {
     std::raise(SIGPIPE);
   }
   return code;
-}
-
-void become_program(const std::string& name, const Arguments& arguments) {
-  std::vector<char*> words = {const_cast<char*>(name.c_str())};
-  for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
-  words.push_back(nullptr);
-  // What run_main() ignores would stay ignored.
-  std::signal(SIGPIPE, SIG_DFL);
-  std::signal(SIGXFSZ, SIG_DFL);
-  std::error_code unknown;
-  const std::filesystem::path here = std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path();
-  if (!unknown) ::execv((here / name).c_str(), words.data());
-  ::execvp(name.c_str(), words.data());
-  const std::string why =
-      errno == ENOENT ? "is not installed, neither beside isohf nor on the path" : std::strerror(errno);
-  throw Error(ErrorCode::kUnsupported, name + ": " + why);
 }
 
 }  // namespace isohf::cli

@@ -20,6 +20,7 @@ struct Command {
   const char* summary;  ///< for the list of commands
   const char* heading;  ///< that it stands under in that list
   Run (*add)(CLI::App& line, Common& common);
+  const char* program = nullptr;  ///< the program that it becomes instead, with all other words of the command line
 };
 
 /// A program. One with a single command of the same name ("isohf-view" and "view") is called without it.
@@ -40,9 +41,5 @@ int run(const Program& program, const Arguments& arguments, Common common = {});
 
 /// What main() is: signals and descriptors made ready, then run().
 int run_main(const Program& program, int argc, char** argv);
-
-/// Becomes the program `name`, which lies beside this one or on the path, with the same descriptors. Throws Error where
-/// it is not installed.
-[[noreturn]] void become_program(const std::string& name, const Arguments& arguments);
 
 }  // namespace isohf::cli

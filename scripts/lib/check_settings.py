@@ -2,8 +2,8 @@
 """check_settings.py: holds the library's messages against the options that set what they name.
 
 The library knows no option: no string literal of libisohf/ or formats/ holds one ("--name"), unless its line says
-NOLINT. A message names a setting by an identifier between backticks, and the table of spellings in
-apps/common/output/standard_output.cpp has each of these, and no other. Prints findings, one a line.
+NOLINT. A message names a setting by an identifier between backticks: an option has its name, with dashes, or that of the
+table of spellings in apps/common/output/standard_output.cpp. Prints findings, one a line.
 """
 import re
 import sys
@@ -30,13 +30,11 @@ def main():
                         print(f'{path}:{number}: "{text}" spells an option; name the setting between backticks')
                     for name in re.findall(r'`([a-z_]+)`', text):
                         named.add(name)
-                        if name not in spellings:
-                            print(f'{path}:{number}: `{name}` has no spelling in {TABLE}')
-    for name, option in spellings.items():
+                        if spellings.get(name, '--' + name.replace('_', '-')) not in declared:
+                            print(f'{path}:{number}: no command has an option for `{name}`')
+    for name in spellings:
         if name not in named:
             print(f'{TABLE}: no message names `{name}`')
-        if option not in declared:
-            print(f'{TABLE}: no command has the option {option}')
 
 
 if __name__ == '__main__':

@@ -1,6 +1,7 @@
 #include "options/command_line.h"
 
 #include <algorithm>
+#include <cctype>
 
 namespace isohf::cli {
 namespace {
@@ -12,17 +13,9 @@ std::string name_in(const std::string& names) {
   return names.substr(from, names.find(',', from) - from);
 }
 
-CLI::callback_t callback(const std::string& names, Take take) {
-  return [name = name_in(names), take = std::move(take)](const CLI::results_t& values) {
-    for (const std::string& value : values) {
-      try {
-        take(value);
-      } catch (const Error& error) {
-        throw BadValue{name, error};
-      }
-    }
-    return true;
-  };
+/// "--overwrite" or "-q": CLI11 takes any word for a value.
+bool is_option(const std::string& word) {
+  return word.starts_with("--") || (word.size() == 2 && word[0] == '-' && std::isalpha(word[1]) != 0);
 }
 
 }  // namespace
@@ -37,7 +30,22 @@ void most_used(CLI::App& line, std::initializer_list<const char*> options) {
 
 CLI::Option* option(CLI::App& line, const std::string& names, const std::string& value_name, const std::string& text,
                     Take take) {
-  return line.add_option(names, callback(names, std::move(take)), text)->type_name(value_name);
+  const auto take_all = [&line, name = name_in(names), take = std::move(take)](const CLI::results_t& values) {
+    // CLI11 calls this before it refuses an option without another that it needs.
+    if (std::ranges::any_of(line.get_option(name)->get_needs(), [](const auto* other) { return other->count() == 0; }))
+      return true;
+    for (const std::string& value : values) {
+      try {
+        if (value.empty() || is_option(value))
+          throw Error(ErrorCode::kInvalidArgument, ErrorParts{"", "'" + value + "'", "a value", ""});
+        take(value);
+      } catch (const Error& error) {
+        throw BadValue{name, error};
+      }
+    }
+    return true;
+  };
+  return line.add_option(names, take_all, text)->type_name(value_name);
 }
 
 CLI::Option* option(CLI::App& line, const std::string& names, const std::string& value_name, const std::string& text,
@@ -66,7 +74,8 @@ CLI::Option* positional(CLI::App& line, const std::string& names, const std::str
 
 CLI::Option* positionals(CLI::App& line, const std::string& usage, const std::string& text,
                          std::vector<std::string>& values) {
-  return line.add_option("INPUT", values, text)->type_name(usage)->take_all();
+  const std::size_t from = usage.starts_with('[') ? 1 : 0;
+  return line.add_option(usage.substr(from, usage.find('.') - from), values, text)->type_name(usage)->take_all();
 }
 
 void exclusive(CLI::App& line, std::initializer_list<const char*> options) {

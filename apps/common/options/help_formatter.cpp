@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <sstream>
-#include <string_view>
 
 #include "options/command_line.h"
 #include "output/terminal.h"
@@ -13,23 +12,20 @@ namespace {
 constexpr std::size_t kNameWidth = 26;
 
 /// Breaks `text` at blanks so that no line is longer than `width`; lines after the first start with `indent` blanks.
-std::string wrapped(std::string_view text, std::size_t indent, std::size_t width) {
+std::string wrapped(const std::string& text, std::size_t indent, std::size_t width) {
   std::string out;
   std::size_t column = indent;
-  std::size_t from = 0;
-  while (from < text.size()) {
-    const std::size_t to = std::min(text.find(' ', from), text.size());
-    const std::size_t length = to - from;
-    if (column > indent && column + 1 + length > width) {
-      (out += '\n').append(indent, ' ');
+  std::istringstream words(text);
+  for (std::string word; words >> word; column += word.size()) {
+    if (column == indent) {
+      out += word;
+    } else if (column + 1 + word.size() > width) {
+      out += "\n" + std::string(indent, ' ') + word;
       column = indent;
-    } else if (column > indent) {
-      out += ' ';
+    } else {
+      out += " " + word;
       ++column;
     }
-    out.append(text, from, length);
-    column += length;
-    from = to + 1;
   }
   return out;
 }
@@ -39,51 +35,39 @@ class Page {
  public:
   explicit Page(int file) : file_(file), width_(text_width(file)) {}
 
-  void heading(const std::string& text) {
-    if (!page_.empty()) page_ += '\n';
-    (page_ += styled(text, Style::kHeading, file_)) += '\n';
-  }
-  void usage(const std::string& call) {
-    (((page_ += styled("Usage:", Style::kHeading, file_)) += ' ') += call) += '\n';
-  }
+  void heading(const std::string& text) { page_ += (page_.empty() ? "" : "\n") + bold(text) + "\n"; }
+  void usage(const std::string& call) { page_ += bold("Usage:") + " " + call + "\n"; }
   void row(const std::string& name, const std::string& description) {
-    std::string line(2, ' ');
-    line += name;
-    if (line.size() + 2 > kNameWidth) {
-      (line += '\n').append(kNameWidth, ' ');
-    } else {
-      line.resize(kNameWidth, ' ');
-    }
-    (page_ += line + wrapped(description, kNameWidth, width_)) += '\n';
+    std::string line = "  " + name;
+    if (line.size() + 2 > kNameWidth) line += '\n';
+    line.resize(line.ends_with('\n') ? line.size() + kNameWidth : kNameWidth, ' ');
+    page_ += line + wrapped(description, kNameWidth, width_) + "\n";
   }
   /// Lines run on until an empty or indented one; indented lines stay as they are, and a line above them that ends with
   /// a colon is a heading.
   void text(const std::string& text) {
-    if (text.empty()) return;
-    if (!page_.empty()) page_ += "\n";
-    std::string lines;
-    const auto end_paragraph = [&] {
-      if (!lines.empty()) (page_ += wrapped(lines, 0, width_)) += '\n';
-      lines.clear();
+    if (!text.empty()) page_ += '\n';
+    std::string paragraph;
+    const auto end_paragraph = [&](bool is_heading) {
+      if (!paragraph.empty()) page_ += (is_heading ? bold(paragraph) : wrapped(paragraph, 0, width_)) + "\n";
+      paragraph.clear();
     };
-    std::istringstream in(text);
-    for (std::string line; std::getline(in, line);) {
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
       if (!line.empty() && line.front() != ' ') {
-        lines += (lines.empty() ? "" : " ") + line;
+        paragraph += (paragraph.empty() ? "" : " ") + line;
         continue;
       }
-      if (!line.empty() && lines.ends_with(":")) {
-        (page_ += styled(lines, Style::kHeading, file_)) += '\n';
-        lines.clear();
-      }
-      end_paragraph();
-      (page_ += line) += '\n';
+      end_paragraph(!line.empty() && paragraph.ends_with(":"));
+      page_ += line + "\n";
     }
-    end_paragraph();
+    end_paragraph(false);
   }
   [[nodiscard]] const std::string& str() const { return page_; }
 
  private:
+  [[nodiscard]] std::string bold(const std::string& text) const { return styled(text, Style::kHeading, file_); }
+
   int file_;
   std::size_t width_;
   std::string page_;
@@ -142,27 +126,26 @@ std::vector<std::pair<std::string, std::vector<const CLI::Option*>>> by_heading(
 
 std::string HelpFormatter::make_help(const CLI::App* line, std::string /*name*/, CLI::AppFormatMode mode) const {
   Page page(common_.out);
-  const CLI::App& root = line->get_parent() == nullptr ? *line : *line->get_parent();
-  const bool has_commands = !line->get_subcommands({}).empty();
   const auto groups = by_heading(*line);
-  const bool is_brief = mode == CLI::AppFormatMode::Normal && groups.front().first == kMostUsed;
+  const bool is_brief = mode == CLI::AppFormatMode::Normal && !groups.empty() && groups.front().first == kMostUsed;
   page.usage(usage_of(*line));
   page.text(line->get_description());
-  if (has_commands) add_commands(page, *line);
-  const auto add_group = [&](const std::string& heading, const std::vector<const CLI::Option*>& options) {
-    page.heading(heading + ":");
+  add_commands(page, *line);
+  const auto add_rows = [&](const std::string& heading, const std::vector<const CLI::Option*>& options) {
+    if (!options.empty()) page.heading(heading + ":");
     for (const CLI::Option* option : options) page.row(shown_name(*option), option->get_description());
   };
-  for (const auto& [heading, options] : groups) {
-    if (!is_brief || heading == kMostUsed) add_group(heading, options);
-  }
   if (is_brief) {
+    add_rows("Arguments", line->get_options([](const CLI::Option* option) { return option->get_positional(); }));
+    add_rows(kMostUsed, groups.front().second);
     page.text(invocation(*line) + " --help lists all options.");
     return page.str();
   }
-  if (&root != line)
-    page.text("Options of every command: --json, -q, -v, --strict, --config FILE, -h, --help, -V (" + root.get_name() +
-              " --help).");
+  for (const auto& [heading, options] : groups) add_rows(heading, options);
+  if (line->get_parent() != nullptr) {
+    page.text("Options of every command: --json, -q, -v, --strict, --config FILE, -h, --help, -V (" +
+              line->get_parent()->get_name() + " --help).");
+  }
   page.text(line->get_footer());
   return page.str();
 }

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "isohf/error.h"
 
@@ -21,42 +23,14 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) {
     for (std::size_t j = 0; j <= b.size(); ++j) {
-      if (i == 0 || j == 0) {
-        d[i][j] = i + j;
-        continue;
-      }
+      d[i][j] = i + j;
+      if (i == 0 || j == 0) continue;
       d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
         d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
-      }
     }
   }
   return d[a.size()][b.size()];
-}
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
-std::string nearest_word(const std::string& text, const std::vector<std::string>& candidates) {
-  constexpr std::size_t kLongest = 64;
-  if (text.size() > kLongest) return {};
-  const std::string typed = lower(text);
-  std::string best;
-  std::size_t best_distance = std::max<std::size_t>(1, typed.size() / 3) + 1;
-  for (const std::string& candidate : candidates) {
-    const std::string word = lower(candidate);
-    std::size_t distance = edit_distance(typed, word);
-    if (typed.size() >= 3 && word.starts_with(typed)) distance = std::min<std::size_t>(distance, 1);
-    // A letter for another of a word of one letter or two is no slip.
-    if (distance < best_distance && distance < word.size() && (word.size() > 2 || distance == 0)) {
-      best_distance = distance;
-      best = candidate;
-    }
-  }
-  return best;
 }
 
 }  // namespace
@@ -69,23 +43,20 @@ bool read_number(std::string_view text, double& value) {
 }
 
 double parse_number(const std::string& text) {
-  double value = 0.0;
-  if (!read_number(text, value) || !std::isfinite(value)) refuse(text, "a finite number");
-  return value;
+  return parse_number_in(text, -std::numeric_limits<double>::max(), std::numeric_limits<double>::max());
 }
 
 double parse_positive_number(const std::string& text) {
-  double value = 0.0;
-  if (!read_number(text, value) || !std::isfinite(value) || value <= 0.0) refuse(text, "a number greater than 0");
-  return value;
+  return parse_number_in(text, std::numeric_limits<double>::min(), std::numeric_limits<double>::max());
 }
 
 double parse_number_in(const std::string& text, double least, double most) {
   double value = 0.0;
-  if (!read_number(text, value) || !(value >= least && value <= most)) {
-    refuse(text, fmt::format("a number from {} to {}", least, most));
-  }
-  return value;
+  if (read_number(text, value) && value >= least && value <= most) return value;
+  const bool has_end = most < std::numeric_limits<double>::max();
+  refuse(text, has_end       ? fmt::format("a number from {} to {}", least, most)
+               : least > 0.0 ? "a number greater than 0"
+                             : "a finite number");
 }
 
 std::int64_t parse_whole_number(const std::string& text, std::int64_t least, std::int64_t most) {
@@ -115,22 +86,18 @@ ShadePalette parse_palette(const std::string& text) {
 }
 
 std::array<int, 3> parse_date(const std::string& text) {
-  constexpr const char* kForm = "a day as 2026-06-21";
-  constexpr int kDays[] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
+  constexpr const char* kForm = "a day of the calendar, as 2026-06-21";
   if (text.size() != 10 || text[4] != '-' || text[7] != '-') refuse(text, kForm);
   const auto part = [&](std::size_t at, std::size_t size) {
-    std::int64_t number = 0;
-    for (const char digit : text.substr(at, size)) {
-      if (digit < '0' || digit > '9') refuse(text, kForm);
-      number = number * 10 + (digit - '0');
-    }
-    return static_cast<int>(number);
+    int number = 0;
+    const char* const end = text.data() + at + size;
+    if (std::from_chars(text.data() + at, end, number).ptr != end) refuse(text, kForm);
+    return number;
   };
   const std::array<int, 3> date{part(0, 4), part(5, 2), part(8, 2)};
-  const bool is_leap = date[0] % 4 == 0 && (date[0] % 100 != 0 || date[0] % 400 == 0);
-  const bool has_month = date[1] >= 1 && date[1] <= 12;
-  const int days = !has_month ? 0 : date[1] == 2 && is_leap ? 29 : kDays[date[1] - 1];
-  if (date[0] < 1 || date[2] < 1 || date[2] > days) refuse(text, "a day of the calendar, as 2026-06-21");
+  const std::chrono::year_month_day day(std::chrono::year{date[0]}, std::chrono::month(static_cast<unsigned>(date[1])),
+                                        std::chrono::day(static_cast<unsigned>(date[2])));
+  if (date[0] < 1 || !day.ok()) refuse(text, kForm);
   return date;
 }
 
@@ -192,26 +159,21 @@ std::uint64_t parse_bytes(const std::string& text) {
 }
 
 TileRange parse_tile_range(const std::string& text) {
-  const auto refuse = [&]() -> std::int64_t {
-    throw Error(
-        ErrorCode::kInvalidArgument,
-        fmt::format("found \"{}\", must be A:B,C:D: columns A to B-1 and rows C to D-1 of tiles, from 0", text));
+  constexpr std::int64_t kMost = 999999999;
+  const std::size_t comma = text.find(',');
+  const auto range = [&](const std::string& part) {
+    const std::size_t colon = part.find(':');
+    return std::pair(parse_whole_number(part.substr(0, colon), 0, kMost),
+                     parse_whole_number(colon == std::string::npos ? "" : part.substr(colon + 1), 0, kMost));
   };
-  const auto split = [&](const std::string& of, char at) {
-    const std::size_t place = of.find(at);
-    if (place == std::string::npos) refuse();
-    return std::pair(of.substr(0, place), of.substr(place + 1));
-  };
-  const auto number = [&](const std::string& of) {
-    return of.empty() || of.find_first_not_of("0123456789") != std::string::npos || of.size() > 9 ? refuse()
-                                                                                                  : std::stoll(of);
-  };
-  const auto [columns, rows] = split(text, ',');
-  const auto [west, east] = split(columns, ':');
-  const auto [north, south] = split(rows, ':');
-  const TileRange range{{number(west), number(north)}, {number(east), number(south)}};
-  if (range.is_empty()) refuse();
-  return range;
+  try {
+    const auto [west, east] = range(text.substr(0, comma));
+    const auto [north, south] = range(comma == std::string::npos ? "" : text.substr(comma + 1));
+    const TileRange tiles{{west, north}, {east, south}};
+    if (!tiles.is_empty()) return tiles;
+  } catch (const Error&) {
+  }
+  refuse(text, "A:B,C:D: columns A to B-1 and rows C to D-1 of tiles, from 0");
 }
 
 std::size_t parse_word(const std::string& text, const std::vector<std::string>& words) {
@@ -224,7 +186,17 @@ std::size_t parse_word(const std::string& text, const std::vector<std::string>& 
 }
 
 std::string did_you_mean(const std::string& text, const std::vector<std::string>& candidates) {
-  const std::string nearest = nearest_word(text, candidates);
+  constexpr std::size_t kLongest = 64;
+  std::string nearest;
+  std::size_t least = std::max<std::size_t>(1, text.size() / 3) + 1;
+  for (const std::string& candidate : candidates) {
+    if (text.size() > kLongest || candidate.size() < 3) continue;
+    const bool is_begun = text.size() >= 3 && candidate.starts_with(text);
+    const std::size_t distance = is_begun ? 1 : edit_distance(text, candidate);
+    if (distance >= least) continue;
+    least = distance;
+    nearest = candidate;
+  }
   return nearest.empty() ? "" : "; did you mean " + nearest + "?";
 }
 

@@ -4,8 +4,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "options/describe.h"
+#include "output/json_output.h"
 #include "output/standard_output.h"
 #include "output/terminal.h"
 
@@ -14,24 +16,20 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kBarInterval{100};
+constexpr milliseconds kTerminalInterval{100};
 constexpr milliseconds kLineInterval{2000};
-constexpr std::size_t kBarCells = 24;
 
-void write_to_terminal(int file, const std::string& text) {
+void write_text(int file, const std::string& text) {
   // A terminal that has gone away is no reason to stop.
   [[maybe_unused]] const ssize_t written = ::write(file, text.data(), text.size());
 }
 
 }  // namespace
 
-ProgressDisplay::ProgressDisplay(const Common& common, ProgressMode mode) : common_(common), style_(Style::kNothing) {
-  if (common.quiet || mode == ProgressMode::kNone) return;
-  if (mode == ProgressMode::kJson) style_ = Style::kJson;
-  if (mode == ProgressMode::kPlain) style_ = Style::kLines;
-  if (mode == ProgressMode::kAuto) {
-    style_ = terminal_columns(common.err) > 0 ? Style::kBar : common.verbose ? Style::kLines : Style::kNothing;
-  }
+ProgressDisplay::ProgressDisplay(const Common& common, ProgressMode mode) : common_(common), mode_(mode) {
+  if (mode == ProgressMode::kAuto && terminal_columns(common.err) == 0)
+    mode_ = common.verbose ? ProgressMode::kPlain : ProgressMode::kNone;
+  if (common.quiet) mode_ = ProgressMode::kNone;
 }
 
 ProgressDisplay::~ProgressDisplay() {
@@ -39,12 +37,12 @@ ProgressDisplay::~ProgressDisplay() {
 }
 
 void ProgressDisplay::clear() {
-  if (bar_is_shown_) write_to_terminal(common_.err, "\r\x1b[K");
-  bar_is_shown_ = false;
+  if (is_shown_) write_text(common_.err, "\r\x1b[K");
+  is_shown_ = false;
 }
 
 void ProgressDisplay::update(const std::string& what, const std::string& unit, std::int64_t done, std::int64_t total) {
-  if (style_ == Style::kNothing) return;
+  if (mode_ == ProgressMode::kNone) return;
   const Clock::time_point now = Clock::now();
   const bool is_new = what != what_;
   const bool is_last = done >= total;
@@ -53,36 +51,34 @@ void ProgressDisplay::update(const std::string& what, const std::string& unit, s
     started_ = now;
     first_done_ = done;
   }
-  const milliseconds interval = style_ == Style::kLines ? kLineInterval : kBarInterval;
+  const milliseconds interval = mode_ == ProgressMode::kPlain ? kLineInterval : kTerminalInterval;
   if (!is_new && !is_last && now - shown_ < interval) return;
   shown_ = now;
   const double seconds = std::chrono::duration<double>(now - started_).count();
   const double rate = seconds > 0.0 ? static_cast<double>(done - first_done_) / seconds : 0.0;
   const double left = rate > 0.0 ? static_cast<double>(total - done) / rate : 0.0;
   const double part = total > 0 ? std::clamp(static_cast<double>(done) / static_cast<double>(total), 0.0, 1.0) : 1.0;
-  if (style_ == Style::kJson) {
-    print_progress(
-        common_,
-        fmt::format(R"({{"progress":"{}","unit":"{}","done":{},"total":{},"seconds":{:.3f},"seconds_left":{:.3f}}})",
-                    what, unit, done, total, seconds, left));
+  if (mode_ == ProgressMode::kJson) {
+    const auto rounded = [](double value) { return std::round(1000.0 * value) / 1000.0; };
+    write_text(common_.err, json_line({{"progress", what},
+                                       {"unit", unit},
+                                       {"done", done},
+                                       {"total", total},
+                                       {"seconds", rounded(seconds)},
+                                       {"seconds_left", rounded(left)}}));
     return;
   }
   std::string text = fmt::format("{} {:3.0f} %  {}/{} {}", what, 100.0 * part, done, total, unit);
   if (rate > 0.0) text += fmt::format("  {:.4g} {}/s", rate, unit);
   if (rate > 0.0 && !is_last) text += fmt::format("  {} left", describe_seconds(left));
-  if (style_ == Style::kLines) {
+  if (mode_ == ProgressMode::kPlain) {
     print_note(common_, text);
     return;
   }
-  // A line that is wider than the terminal cannot be overwritten. The bar gives way before the figures do.
-  const std::size_t columns = terminal_columns(common_.err);
-  const std::size_t room = columns > text.size() + 4 ? std::min(columns - text.size() - 4, kBarCells) : 0;
-  const auto cells = static_cast<std::size_t>(part * static_cast<double>(room));
-  if (columns > 0) text.resize(std::min(text.size(), columns - 1));
-  const std::string bar =
-      room == 0 ? "" : fmt::format("[{}{}] ", std::string(cells, '#'), std::string(room - cells, '.'));
-  write_to_terminal(common_.err, fmt::format("\r{}{}\x1b[K", bar, text));
-  bar_is_shown_ = true;
+  // A line that is wider than the terminal cannot be overwritten.
+  text.resize(std::min(text.size(), std::max<std::size_t>(terminal_columns(common_.err), 1) - 1));
+  write_text(common_.err, "\r" + text + "\x1b[K");
+  is_shown_ = true;
 }
 
 }  // namespace isohf::cli

@@ -11,11 +11,11 @@ namespace isohf::cli {
 /// In the order of --progress's words.
 enum class ProgressMode { kAuto, kPlain, kJson, kNone };
 
-/// How far a long run has come, on standard error: a bar with rate and time left on a terminal, plain lines or JSON
-/// lines otherwise. Erases its bar when it goes.
+/// How far a long run has come, on standard error: one line with rate and time left on a terminal, plain lines or JSON
+/// lines otherwise. Erases its line on a terminal when it goes.
 class ProgressDisplay {
  public:
-  /// -q silences it; kAuto is a bar on a terminal, plain lines with -v, else nothing.
+  /// -q silences it; kAuto is one line on a terminal, plain lines with -v, else nothing.
   ProgressDisplay(const Common& common, ProgressMode mode);
   ~ProgressDisplay();
   ProgressDisplay(const ProgressDisplay&) = delete;
@@ -23,20 +23,19 @@ class ProgressDisplay {
 
   /// `what` names the pass ("tiles"); a new name starts a new clock. `unit` is what is counted.
   void update(const std::string& what, const std::string& unit, std::int64_t done, std::int64_t total);
-  /// Erases the bar, for a line that is printed now.
+  /// Erases the line on a terminal, for one that is printed now.
   void clear();
 
  private:
   using Clock = std::chrono::steady_clock;
-  enum class Style { kNothing, kBar, kLines, kJson };
 
   const Common& common_;
-  Style style_;
+  ProgressMode mode_;  ///< kAuto: on a terminal
   std::string what_;
   Clock::time_point started_;
   Clock::time_point shown_;
   std::int64_t first_done_ = 0;
-  bool bar_is_shown_ = false;
+  bool is_shown_ = false;
 };
 
 }  // namespace isohf::cli

@@ -13,7 +13,8 @@ namespace isohf::cli {
 class Report {
  public:
   /// A member of the document, and the line that says the same: "label        words". Without words there is no line.
-  void add(const std::string& key, nlohmann::ordered_json value, const std::string& label = {}, std::string words = {}) {
+  void add(const std::string& key, nlohmann::ordered_json value, const std::string& label = {},
+           std::string words = {}) {
     json_[key] = std::move(value);
     if (!words.empty()) line(label, std::move(words));
   }

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "output/json_output.h"
 #include "output/terminal.h"
 
 namespace isohf::cli {
@@ -18,65 +19,21 @@ using nlohmann::ordered_json;
 
 constexpr std::size_t kBufferBytes = 1 << 16;
 
-/// Settings as the library's messages name them, and the options that set them.
+/// Settings as the library's messages name them, where the option is not called the same.
 constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
-    {"acquisition", "--acquisition"},
-    {"bbox", "--bbox"},
-    {"channel", "--channel"},
-    {"clamp_range", "--clamp-range"},
-    {"code_type", "--type"},
-    {"density", "--density"},
-    {"date", "--date"},
-    {"encoding", "--encoding"},
-    {"fill", "--fill"},
-    {"fit", "--fit"},
-    {"geoid", "--geoid"},
-    {"levels", "--levels"},
-    {"like", "--like"},
-    {"lossless", "--lossless"},
-    {"max_error", "--max-error"},
-    {"max_rounding", "--max-rounding"},
-    {"max_size", "--texture-size"},
-    {"memory_bytes", "--memory"},
-    {"method", "--method"},
-    {"overwrite", "--overwrite"},
-    {"part", "--part"},
-    {"projection", "--to-crs"},
-    {"raw", "--raw"},
-    {"raw_scale", "--raw-scale"},
-    {"reference_system", "--crs"},
-    {"registration", "--registration"},
-    {"resume", "--resume"},
-    {"shadow_seeds", "--shadow-seeds"},
-    {"shape", "--shape"},
-    {"size", "--size"},
-    {"spacing", "--spacing"},
-    {"step", "--step"},
-    {"sun_min_deg", "--sun-min"},
-    {"surface", "--surface"},
-    {"texture", "--texture"},
-    {"threads", "--threads"},
-    {"tiles", "--tiles"},
-    {"valid_range", "--valid-range"},
+    {"code_type", "--type"},     {"max_size", "--texture-size"}, {"memory_bytes", "--memory"},
+    {"projection", "--to-crs"},  {"reference_system", "--crs"},  {"sun_min_deg", "--sun-min"},
     {"void_values", "--nodata"},
-    {"wrap_x", "--wrap-x"},
-    {"z_offset", "--z-offset"},
-    {"z_range", "--z-range"},
-    {"z_scale", "--z-scale"},
 };
 
-/// Writes a line in one call, so that lines of two processes do not mix; what cannot be told is not told.
-void write_line(int file, const std::string& text) {
-  const std::string line = text + '\n';
-  const char* data = line.data();
-  std::size_t left = line.size();
-  while (left > 0) {
-    const ssize_t written = ::write(file, data, left);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return;
-    data += written;
-    left -= static_cast<std::size_t>(written);
+/// Returns errno of what failed, 0 if everything was written.
+int write_all(int file, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(file, text.data(), text.size());
+    if (written < 0 && errno != EINTR) return errno;
+    if (written > 0) text.remove_prefix(static_cast<std::size_t>(written));
   }
+  return 0;
 }
 
 /// Control characters become blanks, but for those of `kept`.
@@ -95,32 +52,10 @@ std::string without_controls(std::string text, std::string_view kept) {
   return text;
 }
 
-/// On one line; bytes that are no UTF-8 are replaced.
-std::string line_of(const ordered_json& object) {
-  return object.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-}
-
-/// A line for people, `head` of them styled, or the JSON object that says the same.
-void tell(const Common& common, const std::string& head, Style style, const std::string& text,
-          const ordered_json& object) {
-  if (common.json_notes) return write_line(common.err, line_of(object));
-  const std::string name = common.name + ":";
-  write_line(common.err, (style == Style::kWarning ? name + " " + styled(head, style, common.err)
-                                                   : styled(name, style, common.err) + head) +
-                             " " + printable(text));
-}
-
-int report(const Common& common, const std::string& text, const ordered_json& object, int exit_code) {
-  tell(common, "", Style::kError, text, object);
-  if (!common.json) return exit_code;
-  try {
-    StandardOutput out(common);
-    out.write(line_of(object) + "\n");
-    out.finish();
-  } catch (const OutputClosed&) {
-  } catch (const Error&) {  // it has been told on standard error, or is what is being told
-  }
-  return exit_code;
+/// A line on standard error for people, or with --progress json the object that says the same. One call, so that lines
+/// of two processes do not mix; nobody can be told that it failed.
+void print_line(const Common& common, const std::string& line, const ordered_json& object) {
+  static_cast<void>(write_all(common.err, common.json_notes ? json_line(object) : line + "\n"));
 }
 
 }  // namespace
@@ -137,20 +72,13 @@ void StandardOutput::write(std::string_view text) {
 
 void StandardOutput::write_styled(std::string_view text) {
   pending_ += text;
-  if (pending_.size() >= kBufferBytes) flush();
+  if (pending_.size() >= kBufferBytes) finish();
 }
 
-void StandardOutput::flush() {
-  std::size_t from = 0;
-  while (from < pending_.size()) {
-    const ssize_t written = ::write(file_, pending_.data() + from, pending_.size() - from);
-    if (written < 0) {
-      if (errno == EINTR) continue;
-      if (errno == EPIPE) throw OutputClosed{};
-      throw Error(ErrorCode::kIo, std::string("standard output: ") + std::strerror(errno));
-    }
-    from += static_cast<std::size_t>(written);
-  }
+void StandardOutput::finish() {
+  const int failure = write_all(file_, pending_);
+  if (failure == EPIPE) throw OutputClosed{};
+  if (failure != 0) throw Error(ErrorCode::kIo, std::string("standard output: ") + std::strerror(failure));
   pending_.clear();
 }
 
@@ -168,12 +96,14 @@ std::string spelled(std::string text) {
   for (std::size_t open = 0; (open = text.find('`', open)) != std::string::npos; ++open) {
     const std::size_t close = text.find('`', open + 1);
     if (close == std::string::npos) break;
-    const std::string_view name = std::string_view(text).substr(open + 1, close - open - 1);
-    for (const auto& [setting, option] : kSpellings) {
-      if (name != setting) continue;
-      text.replace(open, close - open + 1, option);
-      break;
+    const std::string setting = text.substr(open + 1, close - open - 1);
+    if (setting.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") != std::string::npos) continue;
+    std::string option = "--" + setting;
+    std::ranges::replace(option, '_', '-');
+    for (const auto& [name, other] : kSpellings) {
+      if (name == setting) option = other;
     }
+    text.replace(open, close - open + 1, option);
   }
   return text;
 }
@@ -184,8 +114,8 @@ void print_warnings(const Common& common, const std::vector<Warning>& warnings) 
     const bool is_loss = warning.kind == Warning::Kind::kLoss;
     if (common.quiet && !is_loss) continue;
     const std::string text = spelled(warning);
-    tell(common, "warning:", Style::kWarning, text,
-         {{"warning", {{"kind", is_loss ? "loss" : "note"}, {"message", text}}}});
+    print_line(common, common.name + ": " + styled("warning:", Style::kWarning, common.err) + " " + printable(text),
+               {{"warning", {{"kind", is_loss ? "loss" : "note"}, {"message", text}}}});
   }
 }
 
@@ -218,24 +148,22 @@ ordered_json json_from(const Error& error, int exit_code) {
 }
 
 void print_error_line(const Common& common, const Error& error) {
-  tell(common, "", Style::kError, spelled(error.what()), {{"error", json_from(error, exit_code_for(error.code()))}});
+  Common without_document = common;
+  without_document.json = false;
+  print_error(without_document, error, exit_code_for(error.code()));
 }
 
 int print_error(const Common& common, const Error& error, int exit_code) {
-  return report(common, spelled(error.what()), {{"error", json_from(error, exit_code)}}, exit_code);
-}
-
-int print_internal_error(const Common& common, const std::string& what) {
-  return report(common, "internal error: " + what,
-                {{"error", {{"code", "internal"}, {"exit_code", +kExitFailed}, {"message", what}}}}, kExitFailed);
+  const ordered_json document = {{"error", json_from(error, exit_code)}};
+  print_line(common, styled(common.name + ":", Style::kError, common.err) + " " + printable(spelled(error.what())),
+             document);
+  // Standard output may be what failed.
+  if (common.json) static_cast<void>(write_all(common.out, json_line(document)));
+  return exit_code;
 }
 
 void print_note(const Common& common, const std::string& text) {
-  write_line(common.err, common.json_notes ? line_of({{"note", text}}) : common.name + ": " + printable(text));
-}
-
-void print_progress(const Common& common, const std::string& line) {
-  write_line(common.err, printable(line));
+  print_line(common, common.name + ": " + printable(text), {{"note", text}});
 }
 
 }  // namespace isohf::cli

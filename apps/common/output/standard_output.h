@@ -24,10 +24,8 @@ class StandardOutput {
   void write(std::string_view text);
   /// Text of the program's own, with escape codes.
   void write_styled(std::string_view text);
-  /// Hands everything to the operating system.
-  void flush();
-  /// flush(), named for the end: output that was not finished is lost.
-  void finish() { flush(); }
+  /// Hands everything to the operating system: what comes after the last call is lost.
+  void finish();
 
  private:
   int file_;
@@ -45,21 +43,16 @@ struct OutputClosed {};
 void print_warnings(const Common& common, const std::vector<Warning>& warnings);
 void print_warning(const Common& common, const Warning& warning);
 /// One line on standard error: "isohf convert: ...".
+void print_note(const Common& common, const std::string& text);
 void print_error_line(const Common& common, const Error& error);
 /// The same, and with --json {"error": ...} on standard output. Returns `exit_code`.
 int print_error(const Common& common, const Error& error, int exit_code);
-/// The same for what is a fault of the program's own.
-int print_internal_error(const Common& common, const std::string& what);
+
 /// Text of the library, with the options in place of the settings that it names between backticks.
 [[nodiscard]] std::string spelled(std::string text);
 /// Warnings of a document.
 [[nodiscard]] nlohmann::ordered_json json_from(const std::vector<Warning>& warnings);
-/// The member `error` of such a document: code, exit_code, message, and of where, found, required and remedy what is
-/// known.
+/// The member `error` of a document: code, exit_code, message, and of where, found, required and remedy what is known.
 [[nodiscard]] nlohmann::ordered_json json_from(const Error& error, int exit_code);
-/// One line on standard error: "isohf convert: ...".
-void print_note(const Common& common, const std::string& text);
-/// One line on standard error as it stands.
-void print_progress(const Common& common, const std::string& line);
 
 }  // namespace isohf::cli

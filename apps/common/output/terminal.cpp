@@ -24,36 +24,26 @@ bool takes_escapes(int file) {
   return ::isatty(file) != 0 && !setting("TERM").empty() && setting("TERM") != "dumb";
 }
 
-/// 0 where there is no terminal.
-std::size_t columns_of(int file) {
-  struct winsize size {};
-  if (::isatty(file) == 0) return 0;
-  return ::ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kLeastWidth;
-}
-
-bool takes_colours(int file) {
-  if (!setting("NO_COLOR").empty()) return false;
-  const std::string_view force = setting("CLICOLOR_FORCE");
-  return (!force.empty() && force != "0") || takes_escapes(file);
-}
-
 }  // namespace
 
 std::size_t terminal_columns(int file) {
-  return takes_escapes(file) ? columns_of(file) : 0;
+  struct winsize size {};
+  if (!takes_escapes(file)) return 0;
+  return ::ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kLeastWidth;
 }
 
 std::size_t text_width(int file) {
   const std::string_view columns = setting("COLUMNS");
   std::size_t width = 0;
   std::from_chars(columns.data(), columns.data() + columns.size(), width);
-  if (width == 0) width = columns_of(file);
-  return width == 0 ? kLeastWidth : std::clamp(width, kLeastWidth, kMostWidth);
+  return std::clamp(width == 0 ? terminal_columns(file) : width, kLeastWidth, kMostWidth);
 }
 
 std::string styled(std::string_view text, Style style, int file) {
-  if (!takes_colours(file)) return std::string(text);
-  const char* code = style == Style::kHeading ? "1" : style == Style::kError ? "1;31" : "1;33";
+  const std::string_view force = setting("CLICOLOR_FORCE");
+  const bool is_forced = !force.empty() && force != "0";
+  if (!setting("NO_COLOR").empty() || !(is_forced || takes_escapes(file))) return std::string(text);
+  const char* const code = style == Style::kHeading ? "1" : style == Style::kError ? "1;31" : "1;33";
   return fmt::format("\x1b[{}m{}\x1b[0m", code, text);
 }
 

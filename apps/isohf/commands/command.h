@@ -17,7 +17,6 @@ Run add_plan(CLI::App& line, Common& common);
 Run add_sample(CLI::App& line, Common& common);
 Run add_shade(CLI::App& line, Common& common);
 Run add_verify(CLI::App& line, Common& common);
-Run add_view(CLI::App& line, Common& common);
 
 /// isohf, with all of them.
 extern const Program kIsohf;

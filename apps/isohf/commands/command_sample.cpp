@@ -148,7 +148,7 @@ class Answers {
   /// Answers what there is, and hands it to the operating system.
   void flush() {
     answer();
-    out_.flush();
+    out_.finish();
   }
 
  private:

@@ -15,7 +15,7 @@ constexpr Command kCommands[] = {
     {"convert", "Make an archive from one or more rasters", kMake, add_convert},
     {"info", "Describe rasters and archives", kMake, add_info},
     {"verify", "Check archives, or measure one against its source", kMake, add_verify},
-    {"view", "Explore an archive or raster in 3D, or render it to a PNG", kUse, add_view},
+    {"view", "Explore an archive or raster in 3D, or render it to a PNG", kUse, nullptr, "isohf-view"},
     {"sample", "Print elevation and normal at given points", kUse, add_sample},
     {"shade", "Render a map: relief with cast shadows, or a hillshade", kUse, add_shade},
     {"export", "Write a raster, on the source's grid or any other", kUse, add_export},
