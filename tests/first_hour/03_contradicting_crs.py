@@ -102,7 +102,7 @@ check("heights above the ellipsoid" in isohf("info", "b.isohf").out, "EPSG:4979 
 
 # The remedy, run: the Alps lie in the Alps.
 isohf("convert", srtm, "alps.isohf", "--to-crs", "EPSG:32632", "-q")
-near(isohf("sample", "alps.isohf", "--at-lonlat", 6.5, 44.5).numbers()[0][0], 1003, 4, "the Alps")
+near(isohf("sample", "alps.isohf", "--at", "6.5,44.5", "--in", "lonlat").numbers()[0][0], 1003, 4, "the Alps")
 check("EPSG:32632" in isohf("info", "alps.isohf").out, "--to-crs EPSG:32632 is not recorded")
 
 # Of several inputs each is compared: the one at fault is named, one without a system is completed.

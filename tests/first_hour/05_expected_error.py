@@ -13,7 +13,7 @@ def expect(source, *options, planned=True, factor=FACTOR):
     found = isohf("verify", "e.isohf", "--against", source, "--json").json()["against"]["rms"]
     estimates = [("convert", made)]
     if planned:
-        plan = isohf("convert", source, "p.isohf", "--dry-run", "--json", *options).json()["expected_error"]
+        plan = isohf("plan", source, "p.isohf", "--json", *options).json()["expected_error"]
         estimates.append(("plan", plan))
     for command, estimate in estimates:
         what = f"{command} {source} {' '.join(options)}"

@@ -60,13 +60,13 @@ every = [(c, r, c + w, r + h) for c, r in itertools.product(range(3), range(4)) 
 some = every[::5]
 # Posts of degrees, whose tiles end on them; posts and areas of a map, offsets that are no binary fractions.
 tile = write_tiff("degrees.tif", 241, 241, hills, west=6.0, north=45.0, spacing=1.0 / 240.0, epsg=4326, point=True)
-check(cuts_hold(tile, "posts in degrees", every, "--tiles", "4x6", "--fit") > 10, "no post lies on an edge of tiles")
+check(cuts_hold(tile, "posts in degrees", every, "--shape", "44x67", "--fit") > 10, "no post lies on an edge of tiles")
 posts = write_tiff("posts.tif", 181, 121, hills, west=300000.1, north=5100000.7, spacing=30.1, epsg=32632, point=True)
-check(cuts_hold(posts, "posts in metres", some, "--tiles", "3x4", "--fit") > 10, "no post lies on an edge of tiles")
+check(cuts_hold(posts, "posts in metres", some, "--shape", "44x67", "--fit") > 10, "no post lies on an edge of tiles")
 areas = write_tiff("areas.tif", 210, 150, hills, west=300000.1, north=5100000.7, spacing=29.7, epsg=32632)
-cuts_hold(areas, "areas in metres", some, "--tiles", "3x4", "--fit")
+cuts_hold(areas, "areas in metres", some, "--shape", "44x67", "--fit")
 globe = write_tiff("globe.tif", 240, 120, hills, west=-180.0, north=90.0, spacing=1.5, epsg=4326)
-cuts_hold(globe, "a joined globe", some, "--wrap-x", "--tiles", "4x4", "--fit")
+cuts_hold(globe, "a joined globe", some, "--wrap-x", "--shape", "44x67", "--fit")
 
 # Two tiles of SRTM, as they were found: the whole top row, and what is sampled there.
 names = [write_hgt(f"N44E00{n}.hgt", height=lambda column, row: 800 + column // 8 + row // 9) for n in (6, 7)]
@@ -78,11 +78,11 @@ for sources in (names, [real("N44E006.hgt"), real("N44E007.hgt")]):
     said = isohf("export", "e.isohf", "e.tif", "--overwrite", "--json").json()
     check((said["width"], said["voids"], said["sample_type"]) == (533, 0, "int16"), f"an extract: {said}")
     edge = [(6.5 + 0.01 * i, 44.5) for i in range(25)]
-    found, expected = sample("e.isohf", edge, "--lonlat"), sample("a.isohf", edge, "--lonlat")
+    found, expected = sample("e.isohf", edge, "--in", "lonlat"), sample("a.isohf", edge, "--in", "lonlat")
     check(found == expected, f"samples of an extract's top edge are {found}, must be {expected}")
 
 # A part of a projected archive gives the source's own samples on it.
-isohf("convert", tile, "-o", "utm.isohf", "--to-crs", "utm", "--tiles", "4x6", "-q")
+isohf("convert", tile, "-o", "utm.isohf", "--to-crs", "utm", "--shape", "44x67", "-q")
 isohf("extract", "utm.isohf", "-o", "part.isohf", "--overwrite", "-q", "--bbox", "6.3,44.4,6.5,44.7")
 isohf("export", "part.isohf", "part.tif", "--type", "f64", "-q")
 isohf("export", "part.isohf", "part.npy", "--type", "f64", "-q")

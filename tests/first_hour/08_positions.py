@@ -15,7 +15,7 @@ def summary(name, *options):
 for name, longitude, latitude in (("N44E006.hgt", 6, 44), ("srtm_N44E006.hgt", 6, 44), ("dem-s35e145_v3.hgt", 145, -35),
                                   ("1arc.n10w020.hgt", -20, 10)):
     isohf("convert", write_hgt(name, height=slope), "a.isohf", "--overwrite", "-q")
-    height, = sample("a.isohf", [(longitude + 0.25, latitude + 0.5)], "--lonlat")
+    height, = sample("a.isohf", [(longitude + 0.25, latitude + 0.5)], "--in", "lonlat")
     near(height, 300 + 2 * 600, 1.0, f"{name} in its middle")
 
 # Without one there is a warning of the position and one of the lengths, also with -q, and no projection was asked for.

@@ -1,4 +1,4 @@
-"""`shade --hillshade` is Horn's formula on the surface's elevations in the middle of the pixels, and nothing else.
+"""`shade --kind hillshade` is Horn's formula on the surface's elevations in the middle of the pixels, and nothing else.
 
 Its slopes were 0.33 degrees too gentle in the mean: of means over points that lay between rows, not on triangles. Here the
 formula is applied to what `export --method barycentric` writes, as `gdaldem hillshade -compute_edges` does.
@@ -45,7 +45,7 @@ def compare(archive, size, what, scale=(1.0, 1.0, 1.0), options=(), azimuth=315.
     valid = isohf("info", archive, "--json").json()["metadata"]["valid"]
     pixel = ((valid["x1"] - valid["x0"]) / columns * scale[0], (valid["z1"] - valid["z0"]) / rows * scale[1])
     wanted = horn(columns, rows, [height * scale[2] for height in heights], pixel, azimuth, altitude)
-    isohf("shade", archive, "shade.png", "--overwrite", "--hillshade", "--size", f"{columns}x{rows}", *options)
+    isohf("shade", archive, "shade.png", "--overwrite", "--kind", "hillshade", "--size", f"{columns}x{rows}", *options)
     png_columns, png_rows, channels, pixels = read_png("shade.png")
     check((png_columns, png_rows, channels) == (columns, rows, 1), f"{what}: the picture has another size")
     nodata = sum((a == 0) != (b == 0) for a, b in zip(wanted, pixels))
@@ -65,19 +65,19 @@ write_asc("hills.asc", 120, 90, hills, spacing=30.0)
 isohf("convert", "hills.asc", "hills.isohf", "--type", "f32")
 for size in ((120, 90), (240, 180), (60, 45), (31, 17), (12, 90)):
     compare("hills.isohf", size, f"{size[0]} x {size[1]} pixels")
-compare("hills.isohf", (120, 90), "another sun", options=("--azimuth", "100", "--sun-elevation", "20"), azimuth=100.0,
+compare("hills.isohf", (120, 90), "another sun", options=("--sun", "100,20"), azimuth=100.0,
         altitude=20.0)
 compare("hills.isohf", (120, 90), "--exaggeration 2.5", (1.0, 1.0, 2.5), ("--exaggeration", "2.5"))
 isohf("convert", "hills.asc", "codes.isohf", "--type", "u16")
 compare("codes.isohf", (120, 90), "16-bit codes")
 for threads in (1, 5):
-    isohf("shade", "hills.isohf", f"{threads}.png", "--hillshade", "-j", threads)
+    isohf("shade", "hills.isohf", f"{threads}.png", "--kind", "hillshade", "-j", threads)
 check((FOLDER / "1.png").read_bytes() == (FOLDER / "5.png").read_bytes(), "the picture depends on the threads")
 
 # A plane of one in one to the East, and a sun that shines straight on it.
 write_asc("plane.asc", 40, 30, lambda column, row: 10.0 * (40 - column), spacing=10.0)
 isohf("convert", "plane.asc", "plane.isohf", "--type", "f32")
-isohf("shade", "plane.isohf", "plane.png", "--hillshade", "--azimuth", "E", "--sun-elevation", "45")
+isohf("shade", "plane.isohf", "plane.png", "--kind", "hillshade", "--sun", "90,45")
 check(set(read_png("plane.png")[3]) <= {254, 255}, "a plane that faces the sun isn't white, its edges included")
 
 # Nodata: a hole, and a corner.

@@ -76,7 +76,7 @@ before = contents(there)
 write_asc("cliff.asc", 257, 257, lambda column, row: 70000.0 if row > 250 else 5.0, spacing=4.0)
 isohf("convert", "cliff.asc", "cliff.isohf", "-q")
 for cut in (OLD, NEW):
-    failed = isohf("export", "cliff.isohf", there / "u.raw", *cut, "--z-scale", 1, "--overwrite", code=2)
+    failed = isohf("export", "cliff.isohf", there / "u.raw", *cut, "--raw-scale", 1, "--overwrite", code=2)
     check("does not hold" in failed.err, failed.err)
     check(contents(there) == before, f"{cut}: the export that failed changed {names(there)}")
 

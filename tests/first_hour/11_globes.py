@@ -22,7 +22,7 @@ def globe(name, west, point=False, repeated=False, step=STEP, rows=ROWS, **more)
 
 def ends_meet(archive, what, tolerance=40.0):
     """Elevations at places that are one, and the truth."""
-    at = {longitude: sample(archive, [(longitude, 10.0)], "--lonlat")[0] for longitude in (0, 360, -180, 180, 540)}
+    at = {longitude: sample(archive, [(longitude, 10.0)], "--in", "lonlat")[0] for longitude in (0, 360, -180, 180, 540)}
     check(at[0] == at[360] and at[-180] == at[180] == at[540], f"{what}: one place has two elevations: {at}")
     near(at[0], ground(0.0, 10.0), tolerance, f"{what}, longitude 0")
     near(at[180], ground(180.0, 10.0), tolerance, f"{what}, longitude 180")
@@ -76,9 +76,9 @@ check(isohf("info", "exact.isohf", "--json").json()["metadata"]["wraps_x"], "--m
 
 # Shards are parts of the joined globe.
 for number in (1, 2):
-    isohf("convert", "globe1.tif", f"part{number}.isohf", "--shard", f"{number}/2", "--z-range=-1600:2600", "--tiles", "8x4", "-q")
+    isohf("convert", "globe1.tif", f"part{number}.isohf", "--shard", f"{number}/2", "--z-range=-1600:2600", "--shape", "1000", "-q")
 isohf("merge", "part1.isohf", "part2.isohf", "-o", "merged.isohf", "-q")
-isohf("convert", "globe1.tif", "whole.isohf", "--z-range=-1600:2600", "--tiles", "8x4", "-q")
+isohf("convert", "globe1.tif", "whole.isohf", "--z-range=-1600:2600", "--shape", "1000", "-q")
 check((FOLDER / "merged.isohf").read_bytes() == (FOLDER / "whole.isohf").read_bytes(), "shards of a globe")
 ends_meet("merged.isohf", "two shards")
 
@@ -117,14 +117,14 @@ isohf("verify", "mars.isohf", "--against", "mars.tif", "-q")
 mola = real("megt90n000cb.lbl")
 if mola:
     isohf("convert", mola, "mola.isohf", "-q")
-    at = sample("mola.isohf", [(0, 0), (360, 0), (-360, 0)], "--lonlat")
+    at = sample("mola.isohf", [(0, 0), (360, 0), (-360, 0)], "--in", "lonlat")
     check(len(set(at)) == 1, f"MOLA at longitude 0: {at}")
     near(at[0], -1338.0, 20.0, "MOLA at longitude 0")
     isohf("convert", mola, "mola2.isohf", "-q", "--filter", "bilinear")
-    near(sample("mola2.isohf", [(360, 0)], "--lonlat")[0], -1338.0, 3.0, "MOLA at longitude 360, bilinear")
+    near(sample("mola2.isohf", [(360, 0)], "--in", "lonlat")[0], -1338.0, 3.0, "MOLA at longitude 360, bilinear")
 etopo = real("ETOPO1_1deg.tif")
 if etopo:
     made = isohf("convert", etopo, "etopo.isohf")
     check("joins" in made.out, f"ETOPO1 is open: {made.out}")
-    at = sample("etopo.isohf", [(-180, 10), (180, 10), (540, 10)], "--lonlat")
+    at = sample("etopo.isohf", [(-180, 10), (180, 10), (540, 10)], "--in", "lonlat")
     check(len(set(at)) == 1, f"ETOPO1 at longitude 180: {at}")

@@ -40,7 +40,7 @@ for name, body, radius in (("mars", "Mars", MARS), ("moon", "Moon", MOON)):
         width = metadata["valid"]["x1"] - metadata["valid"]["x0"]
         near(width, 4.0 * math.sqrt(2.0) * radius, 0.01 * radius, f"{code}: Mollweide's width on {body}")
         places = [(lon, lat) for lon in (-120.0, -10.0, 95.0) for lat in (-40.0, 0.0, 55.0)]
-        for place, found in zip(places, sample(name + ".isohf", places, "--lonlat")):
+        for place, found in zip(places, sample(name + ".isohf", places, "--in", "lonlat")):
             near(found, ground(*place), 15.0, f"{code} on {body} at {place}")
     isohf("verify", name + ".isohf", "--against", name + ".tif", "-q")
     planned = isohf("plan", name + ".tif", "--to-crs", "ESRI:54009")
@@ -77,7 +77,7 @@ mola = real("megt90n000cb.lbl")
 if mola:
     made = isohf("convert", mola, "mola.isohf", "--to-crs", "ESRI:54009")
     check("World_Mollweide on Mars" in made.out, made.out)
-    near(sample("mola.isohf", [(226.2, 18.65)], "--lonlat")[0], 21000.0, 1500.0, "Olympus Mons on Mollweide")
+    near(sample("mola.isohf", [(226.2, 18.65)], "--in", "lonlat")[0], 21000.0, 1500.0, "Olympus Mons on Mollweide")
 lola = real("ldem_4_reduced.cub")
 if lola:
     isohf("convert", lola, "lola.isohf", "--to-crs", "ESRI:54009", "-q")

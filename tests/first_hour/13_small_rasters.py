@@ -20,12 +20,11 @@ for columns, rows in ((2, 2), (10, 10), (50, 40), (40, 50), (60, 40), (100, 100)
         check(tiles == 1, f"{columns}x{rows} samples, point {point}: {tiles} tiles, must be one")
         check(shape["columns"] <= 212 + 48 and shape["levels"] >= (2 if columns >= 40 else 1), f"{columns}x{rows}: {shape}")
 
-# A density or a spacing can make a raster small; a larger one keeps its many tiles, and those asked for are made.
+# A density or a spacing can make a raster small; a larger one keeps its many tiles.
 write_asc("medium.asc", 300, 300, hills, spacing=10.0)
 check(plan("medium.asc", "--density", "0.4")[0] == 1, "300x300 samples at 0.4 vertices for each are not one tile")
 check(plan("medium.asc", "--spacing", "30")[0] == 1, "100x100 vertices are not one tile")
 check(plan(write_asc("large.asc", 700, 400, hills))[0] > 1, "700x400 samples are one tile")
-check(plan("small.tif", "--tiles", "3x2")[0] == 6, "--tiles 3x2 does not make six")
 
 # The one tile holds every sample, and gives them back in place.
 posts = write_tiff("posts.tif", 50, 40, hills, west=0.0, north=400.0, spacing=10.0, epsg=32632, point=True)

@@ -41,8 +41,8 @@ secret.write_text("quiet = true\n")
 for key, value, names in (("quiet", "true", ["quiet"]), ("config", "s.toml", ["config"]), ("tmpdir", "/tmp/x", ["tmpdir"]),
                           ("against", "b.tif", ["against"]), ("help", "true", ["help"]), ("json", "true", ["json"]),
                           ("strict", "true", ["strict"]), ("memory", "1G", ["memory"]), ("j", "4", ["j"]),
-                          ("input", "b", ["input"]), ("geoid", "../s.pgm", ["geoid", "../s.pgm"]),
-                          ("geoid", "/s.pgm", ["geoid", "/s.pgm"]), ("raw", "2x2:f99", ["raw", "f99"]),
+                          ("input", "b", ["input"]), ("geoid", "../s.pgm", ["geoid", "without a folder"]),
+                          ("geoid", "/s.pgm", ["geoid", "without a folder"]), ("raw", "2x2:f99", ["raw", "f99"]),
                           ("fill", "maybe", ["fill", "maybe"])):
     # One record of 40 bytes becomes another, with blanks behind it.
     name = altered("a.isohf", "b.isohf", [('"nodata": "-32768"', f'"{key}":"{value}"'.replace("/tmp/x", "/x"))]

@@ -53,7 +53,7 @@ check(max(steep) > 60 and min(steep) < 0.1, "the terrain has no level and steep 
 for name, unit, length in (("ft", "ft", FOOT), ("usft", "US survey foot", US_FOOT), ("km", "km", 1000.0),
                            ("none", None, 1.0)):
     compare(lines(archive(name, length, unit=unit), places), metres, length, f"heights in {name}")
-    shadow = ("--shadow", "--azimuth", "290", "--sun-elevation", "20")
+    shadow = ("--shadow", "--sun", "290,20")
     for here, there in zip(lines(f"{name}.isohf", places, *shadow), lines("m.isohf", places, *shadow)):
         near(here[6] * length, there[6], 0.001, f"heights in {name}: shadow's elevation")
         near(here[7], there[7], 0.001, f"heights in {name}: share of the sun")
@@ -79,13 +79,13 @@ for name, unit, length in (("deg_m", "m", 1.0), ("deg_ft", "ft", FOOT)):
     archive(name, length, "--to-crs", "none", unit=unit, epsg=4326, spacing=SPACING / DEGREE_M, west=9.0,
             north=ROWS / 2 * SPACING / DEGREE_M)
     in_degrees = [(x / DEGREE_M, z / DEGREE_M) for x, z in places]
-    found = lines(f"{name}.isohf", in_degrees, "--shadow", "--azimuth", "290", "--sun-elevation", "20")
+    found = lines(f"{name}.isohf", in_degrees, "--shadow", "--sun", "290,20")
     compare(found, metres, length, f"{name}, laid out in degrees", 0.05)
     off = sum(abs(here[7] - there[7]) > 0.05 for here, there in zip(found, lines("m.isohf", places, *shadow)))
     check(off < len(places) // 100, f"{name}, laid out in degrees: {off} of {len(places)} places are lit differently")
 
 # Pictures are the same to rounding, whatever the exaggeration.
-for kind in ((), ("--hillshade",), ("--hillshade", "--exaggeration", "3"), ("--shadow-mask",)):
+for kind in ((), ("--kind", "hillshade",), ("--kind", "hillshade", "--exaggeration", "3"), ("--kind", "shadow-mask",)):
     pictures = []
     for name in ("m", "ft", "usft"):
         isohf("shade", f"{name}.isohf", f"{name}.png", "--overwrite", "--size", "96", *kind)

@@ -26,6 +26,10 @@ for path in (utm, south, degrees):
     isohf("convert", path, path.with_suffix(".isohf").name, "-q")
 
 
+def at(x, y, system):
+    return ["--at", f"{x},{y}", "--in", system]
+
+
 def hinted(archive, options, words, code=0, stdin=""):
     """The places lie outside and one warning says what they may be; the place that it names lies inside."""
     result = isohf("sample", archive, *options, stdin=stdin, code=code)
@@ -33,32 +37,32 @@ def hinted(archive, options, words, code=0, stdin=""):
     check(len(lines) == 1 and "warning" in lines[0], f"$ {result.command}\n{result.err}must be one warning")
     for word in words:
         check(word in lines[0], f"$ {result.command}\n{lines[0]}\nlacks '{word}'")
-    option = re.search(r": (--at\S*) (\S+) (\S+)$", lines[0])
-    check(option, f"$ {result.command}\n{lines[0]}\nnames no place")
-    again = isohf("sample", archive, *option.groups())
+    place = re.search(r": --at (\S+) --in (\S+)$", lines[0])
+    check(place, f"$ {result.command}\n{lines[0]}\nnames no place")
+    again = isohf("sample", archive, "--at", place[1], "--in", place[2])
     check("outside" not in again.out and not again.err, f"$ {again.command}\n{again.out}{again.err}")
     return result
 
 
 # Middles of the rasters: 7.76 E 45.12 N; 70.91 W 22.62 S; 118.1 W 34.35 N.
 for archive, longitude, latitude in (("utm.isohf", 7.76, 45.12), ("south.isohf", -70.91, -22.62), ("degrees.isohf", -118.1, 34.35)):
-    right = isohf("sample", archive, "--at-lonlat", longitude, latitude)
+    right = isohf("sample", archive, *at(longitude, latitude, "lonlat"))
     check("outside" not in right.out and not right.err, f"{right.command}: {right.out}{right.err}")
-    result = hinted(archive, ["--at-lonlat", latitude, longitude], ["latitude, longitude", f"--at-lonlat {longitude:g} {latitude:g}"])
+    result = hinted(archive, at(latitude, longitude, "lonlat"), ["latitude, longitude", f"--at {longitude:g},{latitude:g} --in lonlat"])
     check(result.out == "outside\n", f"{result.command} prints {result.out}")
-    hinted(archive, ["--lonlat"], ["latitude, longitude"], stdin=f"0 0\n{longitude} {latitude}\n{latitude} {longitude}\n")
+    hinted(archive, ["--in", "lonlat"], ["latitude, longitude"], stdin=f"0 0\n{longitude} {latitude}\n{latitude} {longitude}\n")
     # Degrees where coordinates of the input, or of the world, are read.
     if archive != "degrees.isohf":
-        hinted(archive, ["--at-crs", longitude, latitude], ["longitude, latitude", "--at-lonlat"])
-        hinted(archive, ["--at-crs", latitude, longitude], ["latitude, longitude", "--at-lonlat"])
-hinted("utm.isohf", ["--at-crs", 4997000, 404000], ["northing, easting", "--at-crs 404000 4997000"])
-hinted("utm.isohf", ["--at", 404000, 4997000], ["easting, northing", "--at-crs 404000 4997000"])
-hinted("utm.isohf", ["--at-lonlat", 404000, 4997000], ["easting, northing", "--at-crs 404000 4997000"])
+        hinted(archive, at(longitude, latitude, "crs"), ["longitude, latitude", "--in lonlat"])
+        hinted(archive, at(latitude, longitude, "crs"), ["latitude, longitude", "--in lonlat"])
+hinted("utm.isohf", at(4997000, 404000, "crs"), ["northing, easting", "--at 404000,4997000 --in crs"])
+hinted("utm.isohf", at(404000, 4997000, "world"), ["easting, northing", "--at 404000,4997000 --in crs"])
+hinted("utm.isohf", at(404000, 4997000, "lonlat"), ["easting, northing", "--at 404000,4997000 --in crs"])
 # What lies outside however it is read is an answer, and no news.
 for place in ((100, 45), (0, 0), (8, 50)):
-    result = isohf("sample", "utm.isohf", "--at-lonlat", *place)
+    result = isohf("sample", "utm.isohf", *at(*place, "lonlat"))
     check(result.out == "outside\n" and not result.err, f"{result.command}: {result.err}")
-strict = isohf("sample", "utm.isohf", "--at-lonlat", 45.12, 7.76, "--strict", code=1)
+strict = isohf("sample", "utm.isohf", *at(45.12, 7.76, "lonlat"), "--strict", code=1)
 check("latitude, longitude" in strict.err, f"{strict.command}: {strict.err}")
 
 
@@ -96,5 +100,5 @@ for make in (lambda box: ("export", "degrees.isohf", "part.tif", f"--bbox={box}"
 tuj = real("srtm_bigtujunga30m_utm11.tif")
 if tuj:
     isohf("convert", tuj, "tuj.isohf", "-q")
-    hinted("tuj.isohf", ["--at-lonlat", 34.32, -118.15], ["latitude, longitude", "--at-lonlat -118.15 34.32"])
+    hinted("tuj.isohf", at(34.32, -118.15, "lonlat"), ["latitude, longitude", "--at -118.15,34.32 --in lonlat"])
     corrected(("export", "tuj.isohf", "tuj.tif", "--bbox=-118.1,34.3,-118,34.4", "--overwrite"), ["longitude, latitude", "EPSG:32611"])

@@ -33,7 +33,7 @@ for program, arguments in (("isohf", ["formats"]), ("isohf", ["plan"]), ("isohf"
                            ("isohf", ["info", "coast.isohf", "--tiles"]), ("isohf", ["info", COAST]),
                            ("isohf", ["verify", "coast.isohf"]), ("isohf", ["verify", "coast.isohf", "--json"]),
                            ("isohf", ["diff", "coast.isohf", "peaks.isohf"]), ("isohf", ["export", "coast.isohf", "p.tif"]),
-                           ("isohf", ["convert", "--each", "rasters", "--out-dir", "piped", "--json"]),
+                           ("isohf", ["convert", "rasters", "--out-dir", "piped", "--json"]),
                            ("isohf-view", ["--help"]), ("isohf-experiment", ["--help"])):
     if not (BIN / program).exists():
         continue
@@ -47,13 +47,13 @@ check(shell.returncode in (0, 141) and shell.stderr == "", f"in a shell: {shell.
 
 # 2. A folder that cannot be made or written to is one line, however many files there are, and nothing was begun.
 (FOLDER / "file").write_text("")
-result = refuses("convert", "--each", "rasters", "--out-dir", "file/new", "--keep-going", words=["file/new", "Not a directory"])
+result = refuses("convert", "rasters", "--out-dir", "file/new", "--keep-going", words=["file/new", "Not a directory"])
 check(result.out == "", result.out)
 locked = FOLDER / "locked"
 locked.mkdir()
 locked.chmod(0o555)
 FOLDER.chmod(0o755)
-command = [str(BIN / "isohf"), "convert", "--each", "rasters", "--out-dir", "locked", "--keep-going"]
+command = [str(BIN / "isohf"), "convert", "rasters", "--out-dir", "locked", "--keep-going"]
 try:
     user = {"user": 65534} if os.geteuid() == 0 else {}
     process = subprocess.run(command, cwd=FOLDER, capture_output=True, text=True, timeout=60, check=False, **user)
@@ -63,7 +63,7 @@ except PermissionError:
     pass  # another user cannot run the program
 # Each failure is printed once.
 (rasters / "bad.asc").write_text("ncols 2\nnrows 2\ncellsize 1\n1 2 three 4\n")
-result = isohf("convert", "--each", "rasters", "--out-dir", "made", "--keep-going", code=1)
+result = isohf("convert", "rasters", "--out-dir", "made", "--keep-going", code=1)
 check((result.out + result.err).count("bad.asc") == 1, result.out + result.err)
 check(result.out.startswith("41 files: 40 converted, 1 failed in "), result.out)
 (rasters / "bad.asc").unlink()
@@ -75,14 +75,14 @@ if not sea.exists():
     sea.mkdir()
     for name, height in (("a", 5.0), ("b_sea", None), ("c", 7.0)):
         write_asc(f"sea/{name}.asc", 80, 60, lambda column, row, z=height: z)
-result = isohf("convert", "--each", sea, "--out-dir", "tiles", "--json")
+result = isohf("convert", sea, "--out-dir", "tiles", "--json")
 lines = [json.loads(line) for line in result.out.splitlines()]
 check([line.get("status") for line in lines] == ["converted", "nodata", "converted", None], result.out)
 summary = lines[-1]["summary"]
 check((summary["converted"], summary["nodata"], summary["failed"], summary["not_done"]) == (2, 1, 0, 0), result.out)
 check(result.err.count("\n") == 1 and "b_sea" in result.err, result.err)
 check(sorted(path.name for path in (FOLDER / "tiles").iterdir()) == ["a.isohf", "c.isohf"], "archives of the tiles")
-result = isohf("convert", "--each", sea, "--out-dir", "tiles", "--resume")
+result = isohf("convert", sea, "--out-dir", "tiles", "--resume")
 check(result.out.startswith("3 files: 0 converted, 2 complete before, 1 of nodata alone in "), result.out)
 check(isohf("convert", *(path for path in sorted(sea.iterdir()) if "sea" in path.name), "-o", "sea.isohf", code=1).out == "", "alone")
 
@@ -140,8 +140,8 @@ for number in (1, 2):
 isohf("convert", PEAKS, "-o", "alien.isohf", "--shard", "2/2", "--z-range", "-1000:70000", "--shape", 3000, "-q")
 refuses("merge", "s1.isohf", "alien.isohf", "-o", "both.isohf", words=["alien.isohf: is a shard of another conversion", JOINS], code=2)
 before = (FOLDER / "s2.isohf").read_bytes()
-refuses("merge", "s1.isohf", "s2.isohf", words=["no OUTPUT (-o) given"], code=2)
-refuses("merge", "s1.isohf", "s2.isohf", "--overwrite", words=["no OUTPUT (-o) given"], code=2)
+refuses("merge", "s1.isohf", "s2.isohf", words=["no OUTPUT given (-o)"], code=2)
+refuses("merge", "s1.isohf", "s2.isohf", "--overwrite", words=["no OUTPUT given (-o)"], code=2)
 refuses("merge", "s1.isohf", "s2.isohf", "-o", "s2.isohf", "--overwrite", words=["s2.isohf"], code=2)
 check((FOLDER / "s2.isohf").read_bytes() == before, "merge wrote over its last shard")
 isohf("merge", "s1.isohf", "s2.isohf", "-o", "whole.isohf", "-q")
