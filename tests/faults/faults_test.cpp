@@ -180,7 +180,7 @@ class Faults : public testing::TestWithParam<Job> {
   void expect_one_line(const RunResult& result, const std::string& call, int error) const {
     const bool is_finding = result.err.empty() && result.out.starts_with("ISOHF-");
     EXPECT_TRUE(is_finding || std::count(result.err.begin(), result.err.end(), '\n') == 1) << result.err;
-    EXPECT_TRUE(is_finding || result.err.starts_with("isohf: ")) << result.err;
+    EXPECT_TRUE(is_finding || result.err.starts_with("isohf ")) << result.err;
     if (call == "malloc") return;
     EXPECT_EQ(result.err.find("internal error"), std::string::npos) << result.err;
     if (call == "pthread_create") return;
@@ -279,7 +279,7 @@ TEST(EachOnAFullDisk, BeginsNoOtherFileAndSaysSoOnce) {
   for (const char* name : {"a.tif", "b.tif", "c.tif", "d.tif"}) fs::copy_file(raster, folder / name);
   const RunResult result =
       run_program({"/usr/bin/env", "LD_PRELOAD=" ISOHF_FAULT_INJECTOR, "ISOHF_FAULT=ftruncate 28 1+", isohf_path(),
-                   "convert", "--each", folder.path(), "--out-dir", folder / "out", "--keep-going", "-j", "2"});
+                   "convert", folder.path(), "--out-dir", folder / "out", "--keep-going", "-j", "2"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, testing::HasSubstr("a.isohf: "));
   EXPECT_THAT(result.err, testing::HasSubstr(std::strerror(ENOSPC)));

@@ -57,10 +57,9 @@ class InDirectory {
 };
 
 bool needs_process(const std::vector<std::string>& arguments, const RunOptions& options) {
-  // isohf view becomes another program.
+  // isohf view becomes another program, and a peak of memory is that of a process.
   for (const std::string& word : arguments) {
-    if (word == "view") return true;
-    if (!word.starts_with('-')) break;
+    if (word == "view" || word == "--memory") return true;
   }
   return !options.output_path.empty() || options.close_output || options.file_size_limit_bytes ||
          options.address_space_bytes || options.open_files || options.without_privileges;

@@ -156,7 +156,7 @@ TEST(AlteredArchives, NamesThatNobodyKnowsAreFindings) {
 TEST(AlteredArchives, OtherGroundAndOtherDigestsAreFindings) {
   const TemporaryFolder folder;
   ASSERT_EQ(run_isohf({"convert", ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif", folder / "whole.isohf",
-                       "--tiles", "2x2"})
+                       "--shape", "108x83"})
                 .exit_code,
             0);
   const AlteredArchive whole(folder / "whole.isohf");
@@ -319,7 +319,7 @@ TEST(AlteredArchives, NoProgramCrashesOnThem) {
         {"export", folder / "a.isohf", folder / "r.tif"},
         {"export", folder / "a.isohf", folder / "e.tif", "--size", "20x20"},
         {"shade", folder / "a.isohf", "-o", folder / "s.png", "--size", "20x20"},
-        {"sample", folder / "a.isohf", "--at", "100", "100"}};
+        {"sample", folder / "a.isohf", "--at", "100,100"}};
     for (const std::vector<std::string>& command : commands) {
       SCOPED_TRACE(std::string(c.archive) + c.path + " = " + c.value.dump() + ": " + command.front());
       RunOptions limits;

@@ -30,7 +30,7 @@ class BadInput : public testing::Test {
     const RunResult result = run_isohf(with_more({"convert", input, folder / "out.isohf"}, more));
     EXPECT_THAT(result.exit_code, AnyOf(code.value_or(1), code.value_or(2)));
     EXPECT_EQ(result.out, "");
-    EXPECT_THAT(result.err, testing::StartsWith("isohf: "));
+    EXPECT_THAT(result.err, testing::StartsWith("isohf convert: "));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
     for (const std::string& part : parts) EXPECT_THAT(result.err, HasSubstr(part));
     EXPECT_EQ(folder.names(), before);

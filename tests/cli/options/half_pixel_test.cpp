@@ -275,7 +275,7 @@ TEST_F(HalfPixel, HgtTilesLieWhereTheirNameSays) {
       expected.push_back(kTile.at(lon, lat));
     }
   }
-  std::istringstream lines(run({"sample", folder_ / "again.isohf", "--lonlat", "--json"}, places.str()));
+  std::istringstream lines(run({"sample", folder_ / "again.isohf", "--in", "lonlat", "--json"}, places.str()));
   for (const double elevation : expected) {
     std::string line;
     ASSERT_TRUE(std::getline(lines, line));

@@ -1,14 +1,16 @@
-/// What the program says about itself, and what it says to a wrong command line.
+/// The command line: what is wrong use, which of two words counts, and who gets them.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <csignal>
-#include <map>
+#include <iostream>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
 
+#include "commands/command.h"
+#include "options/command_line.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -16,117 +18,146 @@ namespace isohf::test {
 namespace {
 
 using testing::HasSubstr;
+using Words = std::vector<std::string>;
 
-const std::vector<std::string> kCommands = {"plan",   "convert", "info", "verify", "export",
-                                            "sample", "shade",   "view", "formats"};
-
-std::set<std::string> long_options_in(const std::string& text) {
-  std::set<std::string> found;
-  const std::regex option("--[a-z][a-z0-9-]+");
-  for (std::sregex_iterator at(text.begin(), text.end(), option), end; at != end; ++at) found.insert(at->str());
-  return found;
+/// Exit code 2, no result, and one line that holds `why`.
+void expect_refused(const Words& arguments, const std::string& why) {
+  SCOPED_TRACE(testing::PrintToString(arguments));
+  const RunResult result = run_isohf(arguments);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, testing::StartsWith("isohf"));
+  EXPECT_THAT(result.err, HasSubstr(why));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
 }
 
-TEST(Usage, HelpIsAskedForInThreeWays) {
-  for (const char* argument : {"--help", "-h", "help"}) {
-    const RunResult result = run_isohf({argument});
-    EXPECT_EQ(result.exit_code, 0);
-    EXPECT_EQ(result.err, "");
-    EXPECT_EQ(result.out, run_isohf({"--help"}).out);
-    EXPECT_NE(result.out, "");
+std::string out_of(const Words& arguments, const RunOptions& options = {}) {
+  SCOPED_TRACE(testing::PrintToString(arguments));
+  const RunResult result = run_isohf(arguments, options);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.err, "");
+  return result.out;
+}
+
+TEST(Usage, WrongUseIsOneLine) {
+  expect_refused({}, "no command given");
+  expect_refused({"frmats"}, "unknown command 'frmats'; did you mean formats?");
+  expect_refused({"formats", "all"}, "'all' is one argument too many");
+  expect_refused({"plan", "--shap", "20x20"}, "unknown option --shap; did you mean --shape?");
+  expect_refused({"extract", "a.isohf", "--outptu=b.isohf"}, "unknown option --outptu; did you mean --output?");
+  expect_refused({"plan", "-z"}, "unknown option -z");
+  expect_refused({"plan", "--shape"}, "--shape lacks its value (isohf plan --help lists the options)");
+  expect_refused({"plan", "--shape="}, "--shape: found '', must be a value");
+  expect_refused({"plan", "--shape", "--strict"}, "--shape: found '--strict', must be a value");
+  expect_refused({"convert", "a", "--overwrite=maybe"}, "--overwrite takes no value");
+  expect_refused({"extract", "a.isohf"}, "no OUTPUT given");
+  expect_refused({"extract", "a", "b", "--bbox", "0,0,1,1", "--tiles", "0:1,0:1"}, "excludes");
+  expect_refused({"sample", "a", "--time", "3"}, "--time requires --date");
+  expect_refused({"convert", "a", "--sun-min", "3"}, "--sun-min requires --shadow-seeds");
+  expect_refused({"formats", "--config", "none.toml"}, "--config: none.toml: cannot be read");
+}
+
+TEST(Usage, ErrorsBeforeTheCommandRunsAreDocumentsToo) {
+  for (const Words& words : {Words{"frmats", "--json"}, {"--json", "plan", "--shap"}, {"plan", "--shape", "--json"}}) {
+    const RunResult result = run_isohf(words);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_EQ(nlohmann::json::parse(result.out).at("error").at("exit_code"), 2);
   }
 }
 
-TEST(Usage, VersionIsOneLineEverywhere) {
-  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
-           {"--version"}, {"-V"}, {"info", "-V"}, {"convert", "a.tif", "--version"}}) {
-    const RunResult result = run_isohf(arguments);
-    EXPECT_EQ(result.exit_code, 0);
-    EXPECT_EQ(result.err, "");
-    EXPECT_TRUE(std::regex_match(result.out, std::regex("isohf [0-9]+\\.[0-9]+\\.[0-9]+\n"))) << result.out;
-  }
+TEST(Usage, TheLastOfTwoEqualOptionsCounts) {
+  EXPECT_EQ(out_of({"plan", "--shape", "20x20", "--shape=212x243"}), out_of({"plan", "--shape", "212x243"}));
+  EXPECT_EQ(out_of({"plan", "--type", "u8", "--type", "f32"}), out_of({"plan", "--type=f32"}));
 }
 
-TEST(Usage, CommonOptionsMayStandBeforeTheCommand) {
+TEST(Usage, CommonOptionsStandAnywhere) {
   const TemporaryFolder folder;
-  EXPECT_EQ(run_isohf({"--json", "formats"}).out, run_isohf({"formats", "--json"}).out);
-  EXPECT_EQ(run_isohf({"-q", "-v", "formats"}).out, "");
-  EXPECT_EQ(run_isohf({"-q", "--help"}).out, run_isohf({"--help"}).out);
+  EXPECT_THAT(out_of({"--json", "formats"}), testing::StartsWith("{"));
+  EXPECT_EQ(out_of({"--json", "formats"}), out_of({"formats", "--json"}));
+  EXPECT_EQ(out_of({"-qv", "formats"}), out_of({"formats", "-v", "-q"}));
   write_file(folder / "options.toml", "json = true\n");
-  EXPECT_THAT(run_isohf({"--config", folder / "options.toml", "formats"}).out, testing::StartsWith("{"));
-  EXPECT_THAT(run_isohf({"--config=" + (folder / "options.toml"), "formats"}).out, testing::StartsWith("{"));
+  EXPECT_EQ(out_of({"--config", folder / "options.toml", "formats"}), out_of({"formats", "--json"}));
+  EXPECT_EQ(out_of({"formats", "--config=" + (folder / "options.toml")}), out_of({"formats", "--json"}));
 }
 
-/// The options that --help describes, not those that its text merely names: where a line begins with an option, or with
-/// its letter and the option.
-std::set<std::string> options_described_in(const std::string& help) {
-  std::set<std::string> described;
-  const std::regex option("\n +(-[A-Za-z], )?(--[a-z][a-z0-9-]+)");
-  for (std::sregex_iterator at(help.begin(), help.end(), option), end; at != end; ++at) described.insert((*at)[2]);
-  return described;
+/// Names of files that look like words of the command line.
+TEST(Usage, FilesHaveAnyName) {
+  const TemporaryFolder folder;
+  RunOptions here;
+  here.folder = folder.path();
+  const std::string raster = ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif";
+  for (const char* name : {"info", "[1]", "[a,b]", "{}", "%%", "++", "a b", "=", "x=y"}) {
+    SCOPED_TRACE(name);
+    std::filesystem::copy_file(raster, folder / name);
+    EXPECT_EQ(run_isohf({"info", name, "-q"}, here).exit_code, 0);
+    EXPECT_EQ(run_isohf({"convert", name, "-o", "a.isohf", "-q", "--overwrite"}, here).exit_code, 0);
+  }
+  std::filesystem::copy_file(raster, folder / "-q");
+  std::filesystem::copy_file(raster, folder / "--json");
+  const RunResult result = run_isohf({"info", "info", "-q", "--", "-q", "--json"}, here);
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err, "");
 }
 
-/// The options that a part of the manual names, from its heading "## ..." to the next such.
-std::set<std::string> options_in_section(const std::string& manual, const std::string& heading) {
-  const std::size_t begin = manual.find("\n## " + heading + "\n");
-  EXPECT_NE(begin, std::string::npos) << heading;
-  if (begin == std::string::npos) return {};
-  return long_options_in(manual.substr(begin, manual.find("\n## ", begin + 1) - begin));
+TEST(Usage, ValuesMayBeNegativeAttachedOrOptional) {
+  const TemporaryFolder folder;
+  const std::string raster = ISOHF_SOURCE_DIR "/testdata/voids_200x150_int16.tif";
+  out_of({"convert", raster, folder / "a.isohf", "-q", "-j1", "--z-offset", "-5"});
+  out_of({"convert", raster, folder / "b.isohf", "-qj2", "--z-offset=-5"});
+  EXPECT_TRUE(read_file(folder / "a.isohf") == read_file(folder / "b.isohf"));
+  // Followed by a word that is no value of the flag.
+  out_of({"convert", "--fill", raster, folder / "c.isohf", "-q"});
+  out_of({"convert", "--fill=50", raster, folder / "d.isohf", "-q"});
+  expect_refused({"convert", "--fill=x", raster, folder / "e.isohf"}, "--fill: found 'x'");
 }
 
-TEST(Usage, TheManualKnowsEveryOptionInTheCommandsOwnPart) {
-  const std::string manual = read_file(ISOHF_SOURCE_DIR "/docs/cli.md");
-  // What a part says to hold as elsewhere.
-  const std::map<std::string, std::vector<std::string>> also = {{"plan", {"Input options", "convert"}},
-                                                                {"convert", {"Input options"}},
-                                                                {"info", {"Input options"}},
-                                                                {"verify", {"Input options"}}};
-  for (const std::string& command : kCommands) {
-    std::set<std::string> named = options_in_section(manual, "Common options");
-    // In the manual's first lines.
-    named.insert("--output");
-    named.merge(options_in_section(manual, command));
-    if (const auto others = also.find(command); others != also.end()) {
-      for (const std::string& heading : others->second) named.merge(options_in_section(manual, heading));
-    }
-    for (const std::string& option : options_described_in(run_isohf({command, "--help"}).out)) {
-      EXPECT_TRUE(named.contains(option)) << command << " " << option;
+TEST(Usage, HelpIsPrintedWhateverElseIsWrong) {
+  for (const cli::Command& declared : cli::kIsohf.commands) {
+    if (declared.program != nullptr) continue;
+    const std::string command = declared.name;
+    const std::string help = out_of({command, "--help"});
+    EXPECT_THAT(help, testing::StartsWith("Usage: isohf " + command));
+    EXPECT_EQ(out_of({"help", command}), help);
+    EXPECT_EQ(out_of({"--help", command}), help);
+    EXPECT_EQ(out_of({command, "-h", "--help"}), help);
+    EXPECT_EQ(out_of({command, "a", "b", "--nonsense", "--shape", "x", "--help"}), help);
+    EXPECT_EQ(out_of({command, "--nonsense", "-h"}), out_of({command, "-h"}));
+  }
+  EXPECT_EQ(out_of({"help"}), out_of({"--help"}));
+  // Every argument has a line of its own, in the short help as well.
+  EXPECT_THAT(out_of({"convert", "-h"}), HasSubstr("\n  INPUT... OUTPUT.isohf"));
+}
+
+/// Counts from the declarations; a slot is an option of a command. Those that all commands have are counted once.
+TEST(Usage, EveryOptionIsDescribed) {
+  cli::Common common;
+  CLI::App root(cli::kIsohf.summary, cli::kIsohf.name);
+  cli::declare(cli::kIsohf, root, common);
+  std::set<std::string> names;
+  std::size_t slots = 0;
+  std::vector<const CLI::App*> lines = {&root};
+  for (const CLI::App* command : root.get_subcommands({})) lines.push_back(command);
+  for (const CLI::App* line : lines) {
+    for (const CLI::Option* option : line->get_options()) {
+      if (line != &root && (option == line->get_help_ptr() || option == line->get_help_all_ptr())) continue;
+      const std::string text = option->get_description();
+      EXPECT_NE(text, "") << line->get_name() << " " << option->get_name();
+      EXPECT_TRUE(text.find("[default") == std::string::npos || text.ends_with(']')) << text;
+      if (option->get_lnames().empty()) continue;
+      names.insert(cli::long_name(*option));
+      ++slots;
     }
   }
+  std::cout << cli::kIsohf.commands.size() << " commands, " << names.size() << " options, " << slots << " slots\n";
 }
 
-/// What TAB offers after the program's name and `words`, the last of which is begun.
-std::string completions_of(const std::string& words, int at) {
-  const std::string script = "source " ISOHF_SOURCE_DIR "/apps/isohf/completion.bash; COMP_WORDS=(" + isohf_path() +
-                             words + "); COMP_CWORD=" + std::to_string(at) + "; _isohf; echo \"${COMPREPLY[@]}\"";
-  return run_program({"/bin/bash", "-c", script}).out;
-}
-
-TEST(Usage, BashCompletesCommandsAndOptions) {
-  EXPECT_EQ(completions_of(" co", 1), "convert\n");
-  EXPECT_EQ(completions_of(" convert --dens", 2), "--density\n");
-  EXPECT_EQ(completions_of(" sample --at", 2), "--at --at-lonlat --at-crs\n");
-  EXPECT_EQ(completions_of(" --js", 1), "--json\n");
-  EXPECT_EQ(completions_of(" --json co", 2), "convert\n");
-  EXPECT_EQ(completions_of(" --config my.toml co", 3), "convert\n");
-  EXPECT_EQ(completions_of(" help co", 2), "convert\n");
-  EXPECT_EQ(completions_of(" view --mode t", 3), "texture\n");
-  EXPECT_EQ(completions_of(" convert --filter bs", 3), "bspline3\n");
-  EXPECT_EQ(completions_of(" info " ISOHF_SOURCE_DIR "/READ", 2), ISOHF_SOURCE_DIR "/README.md\n");
-}
-
-TEST(Usage, BashCompletesEveryCommandOptionAndWord) {
-  const std::string commands = " " + completions_of(" ''", 1);
-  for (const std::string& command : kCommands) {
-    EXPECT_THAT(commands, HasSubstr(" " + command + " "));
-    const std::string help = run_isohf({command, "--help"}).out;
-    const std::set<std::string> offered = long_options_in(completions_of(" " + command + " --", 2));
-    EXPECT_EQ(offered, options_described_in(help)) << command;
+TEST(Usage, VersionIsOneLineOrADocument) {
+  for (const Words& words : {Words{"--version"}, {"-V"}, {"info", "-V"}, {"convert", "a.tif", "--version"}})
+    EXPECT_TRUE(std::regex_match(out_of(words), std::regex("isohf [0-9]+\\.[0-9]+\\.[0-9]+\n")));
+  for (const Words& words : {Words{"--json", "--version"}, {"info", "--json", "-V"}}) {
+    const nlohmann::json document = nlohmann::json::parse(out_of(words));
+    EXPECT_EQ("isohf " + document.at("version").get<std::string>() + "\n", out_of({"-V"}));
   }
-  EXPECT_EQ(completions_of(" export --method h", 3), "hex\n");
-  EXPECT_EQ(completions_of(" shade --palette g", 3), "gray\n");
-  // Of convert and plan it is a flag.
-  EXPECT_EQ(completions_of(" convert --fit interpol", 3), "\n");
 }
 
 TEST(Usage, ReaderThatLeavesIsNoMessage) {
@@ -137,19 +168,29 @@ TEST(Usage, ReaderThatLeavesIsNoMessage) {
   EXPECT_EQ(result.err, "");
 }
 
-TEST(Usage, VersionAndHelpAreDocumentsWhereTheseAreAskedFor) {
-  for (const std::vector<std::string>& arguments :
-       std::vector<std::vector<std::string>>{{"--json", "--version"}, {"info", "--json", "-V"}}) {
-    const nlohmann::json document = nlohmann::json::parse(run_isohf(arguments).out);
-    EXPECT_EQ(document.at("name"), "isohf");
-    EXPECT_EQ("isohf " + document.at("version").get<std::string>() + "\n", run_isohf({"-V"}).out);
-  }
-  for (const std::vector<std::string>& arguments :
-       std::vector<std::vector<std::string>>{{"--help"}, {"convert", "--help"}, {"help", "convert"}}) {
-    std::vector<std::string> asked = arguments;
-    asked.push_back("--json");
-    EXPECT_EQ(nlohmann::json::parse(run_isohf(asked).out).at("help"), run_isohf(arguments).out);
-  }
+/// A program in place of isohf-view, which prints its words.
+TEST(Usage, ViewGetsAllOtherWords) {
+  const TemporaryFolder folder;
+  const std::string isohf = folder / "isohf";
+  std::filesystem::copy_file(isohf_path(), isohf);
+  write_file(folder / "isohf-view", "#!/bin/sh\nprintf '%s\\n' \"$@\"\nexit 3\n");
+  std::filesystem::permissions(folder / "isohf-view", std::filesystem::perms::owner_all);
+  const auto words_of = [&](Words words) {
+    words.insert(words.begin(), isohf);
+    const RunResult result = run_program(words);
+    EXPECT_EQ(result.exit_code, 3);
+    EXPECT_EQ(result.err, "");
+    return result.out;
+  };
+  EXPECT_EQ(words_of({"view", "x", "--bogus", "--size=", "a", "--", "-b", "[1]"}),
+            "x\n--bogus\n--size=\na\n--\n-b\n[1]\n");
+  EXPECT_EQ(words_of({"-q", "--config", "view", "view", "view"}), "-q\n--config\nview\nview\n");
+  EXPECT_EQ(words_of({"view", "--help"}), "--help\n");
+  EXPECT_EQ(words_of({"help", "view"}), "--help\n");
+  std::filesystem::remove(folder / "isohf-view");
+  const RunResult missing = run_program({"/usr/bin/env", "PATH=/nowhere", isohf, "view"});
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_EQ(missing.err, "isohf: isohf-view: is not installed, neither beside isohf nor on the path\n");
 }
 
 }  // namespace

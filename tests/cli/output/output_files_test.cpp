@@ -48,9 +48,9 @@ class OutputFiles : public ::testing::Test {
 };
 
 TEST_F(OutputFiles, AnOutputThatIsNotCalledIsohfNeedsItsOption) {
-  expect_refused({"convert", "a.tif", "b.tif"}, "b.tif is not called .isohf and counts as an input");
-  expect_refused({"convert", "a.tif", "b.tif", "--overwrite"}, "counts as an input");
-  expect_refused({"convert", "a.tif", "new.zip"}, "-o new.zip");
+  expect_refused({"convert", "a.tif", "b.tif"}, "b.tif is an input");
+  expect_refused({"convert", "a.tif", "b.tif", "--overwrite"}, "b.tif is an input");
+  expect_refused({"convert", "a.tif", "new.zip"}, "new.zip is an input");
   run({"convert", "a.tif", "-o", "new.zip", "-q"});
   run({"convert", "a.tif", "NEW.ISOHF", "-q"});
 }
