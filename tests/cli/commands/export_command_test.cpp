@@ -232,7 +232,7 @@ TEST_F(ExportCommand, RefusesTilesThatDoNotComeOutWhole) {
   EXPECT_THAT(refused({out, "--size", "1000x1000", "--tile-size", "129", "--overlap", "1"}),
               HasSubstr("1000 columns do not make 8 whole tiles of 129 that share 1; 1025 do"));
   EXPECT_THAT(refused({out, "--tile-size", "4", "--overlap", "3"}), HasSubstr("at least twice the overlap"));
-  EXPECT_THAT(refused({out, "--overlap", "1"}), HasSubstr("--overlap needs --tile-size"));
+  EXPECT_THAT(refused({out, "--overlap", "1"}), HasSubstr("--overlap requires --tile-size"));
   EXPECT_THAT(refused({out, "--bbox", "1,2,1,3"}), HasSubstr("must be WEST,SOUTH,EAST,NORTH"));
 }
 

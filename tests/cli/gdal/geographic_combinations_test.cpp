@@ -101,7 +101,7 @@ struct Combination {
                                                std::to_string((*box)[2]) + "," + std::to_string((*box)[3])});
     }
     words.insert(words.end(), {"--to-crs", kind, "--step", step});
-    if (fill) words.insert(words.end(), {"--fill", "--fill-distance", "10"});
+    if (fill) words.insert(words.end(), {"--fill=10"});
     words.insert(words.end(), more.begin(), more.end());
     return words;
   }
@@ -297,8 +297,8 @@ TEST_F(GeographicCombinations, LosslessKeepsTheFilesOwnSamplesBehindBoxAndFill) 
             return 3000.0 * std::sin(longitude * kDegree) * std::cos(latitude * kDegree);
           },
           [&](double longitude, double latitude) { return std::hypot(longitude - 22.0, latitude - 11.0) < 9.0; }});
-  const Words options = {"--to-crs", "equirectangular", "--fill",          "--fill-distance", "10",
-                         "--wrap-x", "--bbox",          "-180,-50,185,60", "--lossless"};
+  const Words options = {"--to-crs", "equirectangular", "--fill=10", "--wrap-x",
+                         "--bbox",   "-180,-50,185,60", "--lossless"};
   const RunResult made = run_with({"convert", folder / "pieces", folder / "a.isohf"}, options);
   ASSERT_EQ(made.exit_code, 0) << made.err;
   const RunResult restored = run_isohf({"export", folder / "a.isohf", folder / "a.tif"});
