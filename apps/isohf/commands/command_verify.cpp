@@ -227,7 +227,7 @@ int check(const VerifyOptions& options, const std::string& path, bool is_one_of_
   StandardOutput out(common);
   const bool prints_text = !common.json && !common.quiet;
   if (prints_text) out.write(text_from(checks));
-  out.flush();
+  out.finish();
   report.print(common, is_one_of_many);
   if (prints_text) {
     out.write(fmt::format("{}: {}: {} tiles and {} shared vertices checked, {} findings\n", printable(path),
