@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "formats/io/text.h"
 #include "input/input_files.h"
 #include "interrupt.h"
 #include "isohf/base/output_file.h"
@@ -24,14 +23,6 @@ using nlohmann::ordered_json;
 /// Larger files are not tried on one thread first.
 constexpr std::uint64_t kLargeFileBytes = std::uint64_t{32} << 20U;
 
-/// "N44E006" of a/N44E006.hgt.zip: without the extension, and that of what is packed.
-std::string archive_name(const std::string& input) {
-  const fs::path name = fs::path(input).filename();
-  const std::string ending = lower_case(name.extension().string());
-  const bool is_packed = (ending == ".gz" || ending == ".zip") && is_raster_in_folder(name.stem().string());
-  return (is_packed ? name.stem().stem() : name.stem()).string() + ".isohf";
-}
-
 /// Whether the archive's folder takes no file any more, and will not take the next one.
 bool is_folder_at_fault(const EachFile& file, const Error& error) {
   return error.code() == ErrorCode::kIo && std::string_view(error.what()).starts_with(file.output);
@@ -46,7 +37,7 @@ std::vector<EachFile> files_of(const ConvertCommandOptions& options) {
   std::set<fs::path> folders;
   std::error_code none;
   for (const InputFile& found : find_inputs(options.inputs.names, options.inputs.recursive)) {
-    const fs::path output = fs::path(options.out_dir) / found.below / archive_name(found.path);
+    const fs::path output = fs::path(options.out_dir) / found.below / (bare_name(found.path) + ".isohf");
     const auto [other, is_new] = input_of.emplace(output.string(), found.path);
     if (!is_new) {
       throw Error(ErrorCode::kInvalidArgument,

@@ -139,11 +139,10 @@ void add_extra_options(CLI::App& line, ConvertCommandOptions& options) {
                  "Effort to make the archive small; the elevations are the same", options.convert.effort);
   line.add_flag("--lossless", options.convert.lossless,
                 "Store residuals too, so that isohf export returns every sample bit for bit");
-  CLI::Option* const seeds = line.add_flag_callback(
-      "--shadow-seeds", [&options] { options.convert.shadow_seeds.emplace(); },
-      "Store what each tile needs to compute its own cast shadows");
+  CLI::Option* const seeds =
+      line.add_flag("--shadow-seeds", options.with_seeds, "Store what each tile needs to compute its own cast shadows");
   option(line, "--sun-min", "DEG", "Lowest sun for --shadow-seeds; a lower one takes more room [default: 2]",
-         [&options](const std::string& text) { options.convert.shadow_seeds.value().sun_min_deg = parse_number(text); })
+         [&options](const std::string& text) { options.seeds.sun_min_deg = parse_number(text); })
       ->needs(seeds);
   CLI::Option* const photo = option(line, "--texture", "PHOTO",
                                     "Cut a texture for every tile from a picture, placed by its georeference, else "
@@ -210,6 +209,7 @@ void complete(const CLI::App& line, ConvertCommandOptions& options) {
     refuse("--lossless keeps the input's own samples, --geoid changes them; give one of the two");
   options.inputs.as_given = recorded_options(line);
   options.work.scratch_folder = scratch_folder_for(options.out_dir.empty() ? options.output : options.out_dir + "/");
+  if (options.with_seeds) options.convert.shadow_seeds = options.seeds;
   options.convert.strict = options.common.strict;
 }
 

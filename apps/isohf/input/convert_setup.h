@@ -25,6 +25,8 @@ struct ConvertCommandOptions {
   OpenOptions open{};
   std::string photo{};  ///< for textures; empty: none
   TextureRequest texture{};
+  bool with_seeds = false;
+  ShadowSeedRequest seeds{};
   ConvertOptions convert{};
   GeoidRequest geoid{};
   bool spacing_in_metres = false;

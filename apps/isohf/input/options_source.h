@@ -1,6 +1,6 @@
 #pragma once
 
-#include "formats/option_text.h"
+#include "formats/io/option_text.h"
 #include "formats/registry.h"
 #include "isohf/fill/geoid_source.h"
 #include "isohf/raster.h"

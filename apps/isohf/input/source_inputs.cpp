@@ -53,6 +53,19 @@ void describe_mosaic(const MosaicPlan& plan, OverlapRule rule, SourceNote& note)
   note.fingerprint = fmt::format("mosaic {} {} files {}", record.overlap, members.size(), sha256_of(text));
 }
 
+/// Whether the last column repeats the first one, and both edges will be joined.
+bool drops_repeated_column(const SourceInfo& info, GroundRequest request, bool keeps_samples) {
+  if (request.wrap == Wrap::kNever || (request.wrap == Wrap::kAuto && keeps_samples)) return false;
+  GroundRequest own;
+  understand_ground(info, own);
+  if (closure_of(info, own.source_map.get()) != Closure::kRepeated) return false;
+  if (request.wrap == Wrap::kAlways) return true;
+  SourceInfo closed = info;
+  --closed.width;
+  understand_ground(closed, request);
+  return make_source_frame(closed, request).wraps_x;
+}
+
 /// Declares the options of an input in a command line of its own.
 void declare_input(CLI::App& line, RecordedInput& input) {
   line.set_help_flag();

@@ -104,7 +104,7 @@ TEST_F(ConvertEach, LeavesExistingArchivesUnlessToldWhatToDo) {
   const std::string before = read_text(out_ + "/a.isohf");
   const RunResult refused = each();
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.err, HasSubstr("exists, and 5 more archives do; --resume"));
+  EXPECT_THAT(refused.err, HasSubstr("exists, and 5 more; --resume"));
   fs::remove(out_ + "/c.isohf");
   const RunResult resumed = each({"--resume"});
   EXPECT_EQ(resumed.exit_code, 0);

@@ -20,15 +20,15 @@ TEST(PlanCommand, InputGivesTheWholePlanAndWritesNothing) {
   const RunResult text = run_isohf({"plan", folder / "a.tif", "--shape", "52x67"});
   EXPECT_EQ(text.exit_code, 0) << text.err;
   EXPECT_EQ(text.err, "");
-  EXPECT_THAT(text.out, HasSubstr("\ntiles        4 x 3 of 52x67, "));
+  EXPECT_THAT(text.out, HasSubstr("\ntiles        6 x 4 of 52x67, "));
   EXPECT_LE(std::count(text.out.begin(), text.out.end(), '\n'), 8) << text.out;
   const RunResult result =
       run_isohf({"plan", folder / "a.tif", "--shape", "52x67", "--sample-spacing", "10", "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const json plan = json::parse(result.out);
-  EXPECT_EQ(plan.at("grid").at("tiles"), 12);
+  EXPECT_EQ(plan.at("grid").at("tiles"), 24);
   EXPECT_EQ(plan.at("shape").at("columns"), 52);
-  EXPECT_EQ(plan.at("lattice_samples"), 12 * 52 * 67);
+  EXPECT_EQ(plan.at("lattice_samples"), 24 * 52 * 67);
   EXPECT_TRUE(plan.at("input").at("in_metres").get<bool>());
   EXPECT_GT(plan.at("estimated_memory_bytes").get<double>(), 0.0);
   EXPECT_EQ(folder.names(), std::vector<std::string>{"a.tif"});

@@ -105,7 +105,11 @@ TEST_F(ShardsCommand, AreRefusedByNumberAndOptions) {
 
 /// What plan prints is pasted; the shards have the codes of a run without --z-range, and nothing lies outside.
 TEST_F(ShardsCommand, NeedTheOptionsThatPlanPrints) {
-  for (const Words& more : {Words{}, {"--filter", "bspline3"}, {"--step", "0.3"}, {"--type", "u8"}, {"--type", "f32"},
+  for (const Words& more : {Words{},
+                            {"--filter", "bspline3"},
+                            {"--step", "0.3"},
+                            {"--type", "u8"},
+                            {"--type", "f32"},
                             {"--max-rounding", "0.2", "--acquisition", "box"}}) {
     const RunResult text = run(with_more({"plan", "land.tif", "--shape", "28x35", "--shard", "1/2"}, more));
     ASSERT_EQ(text.exit_code, 0) << text.err;
@@ -220,7 +224,8 @@ TEST_F(ShardsCommand, OfAnArchiveACoarsePlaneIsAnArchiveOfItsOwn) {
   EXPECT_EQ(afar.at("metadata").at("planes").at("count").get<int>(),
             whole.at("metadata").at("planes").at("count").get<int>() - 1);
   EXPECT_FALSE(afar.at("metadata").contains("shadow_seeds"));
-  EXPECT_EQ(run({"extract", "single.isohf", "-o", "corner.isohf", "--overview", "1", "--tiles", "0:1,0:2"}).exit_code, 0);
+  EXPECT_EQ(run({"extract", "single.isohf", "-o", "corner.isohf", "--overview", "1", "--tiles", "0:1,0:2"}).exit_code,
+            0);
   EXPECT_EQ(run({"verify", "corner.isohf"}).exit_code, 0);
   expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--overview", "9"}, 2,
                  "coarse planes, plane 9 is asked for");

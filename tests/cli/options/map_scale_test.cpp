@@ -98,7 +98,7 @@ class MapCommand : public testing::Test {
       return std::to_string(0.5 * (valid.at(low).get<double>() + valid.at(high).get<double>()));
     };
     const json sample = json::parse(
-        run_isohf({"sample", folder / archive, "--at", middle("x0", "x1"), middle("z0", "z1"), "--json"}).out);
+        run_isohf({"sample", folder / archive, "--at", middle("x0", "x1") + "," + middle("z0", "z1"), "--json"}).out);
     const auto normal = sample.at("normal").get<std::vector<double>>();
     return std::hypot(normal[0], normal[2]) / normal[1];
   }
@@ -109,7 +109,7 @@ class MapCommand : public testing::Test {
 TEST_F(MapCommand, WebMercatorIsWarnedOfWithTheFigureAndTheRemedy) {
   for (const RunResult& result : {run_isohf({"plan", folder / "web.tif"}), convert("web.tif", "web.isohf")}) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
-    EXPECT_THAT(result.out, HasSubstr("map scale    lengths on the input's map are 1.40"));
+    EXPECT_THAT(result.out, HasSubstr("map          lengths on the input's map are 1.40"));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
     EXPECT_THAT(result.err, HasSubstr("web.tif: lengths on its map are 1.40"));
     EXPECT_THAT(result.err, HasSubstr("--to-crs auto lays the surface on a truer map"));
@@ -139,7 +139,7 @@ TEST_F(MapCommand, ProjectionAutoGivesTrueLengths) {
   const RunResult result = convert("web.tif", "true.isohf", {"--to-crs", "auto"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.err, "");
-  EXPECT_THAT(result.out, HasSubstr("projection   lambert-conformal around longitude 6.4995, "));
+  EXPECT_THAT(result.out, HasSubstr("map          lambert-conformal around longitude 6.4995, "));
   EXPECT_THAT(result.out, HasSubstr("the input's own map errs by 40"));
   EXPECT_NEAR(steepness("true.isohf"), 0.1, 0.0002);
   const json metadata = info("true.isohf").at("metadata");
@@ -184,7 +184,7 @@ TEST_F(MapCommand, MapsThatAreTrueEnoughStayWhatTheyAre) {
   const RunResult plain = convert("utm.tif", "a.isohf");
   EXPECT_EQ(plain.exit_code, 0);
   EXPECT_EQ(plain.err, "");
-  EXPECT_THAT(plain.out, HasSubstr("map scale    lengths on the input's map are 1.000"));
+  EXPECT_THAT(plain.out, HasSubstr("map          lengths on the input's map are 1.000"));
   EXPECT_EQ(convert("utm.tif", "b.isohf", {"--to-crs", "auto"}).err, "");
   EXPECT_EQ(info("a.isohf").at("metadata"), info("b.isohf").at("metadata"));
 }
@@ -319,7 +319,8 @@ TEST_F(MapCommand, WithoutTheModuleAllElseWorksAndALineSaysWhatIsMissing) {
   const RunResult result = run_program({program, "convert", folder / "web.tif", folder / "a.isohf"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.err, "");
-  EXPECT_THAT(result.out, HasSubstr("map scale    not known: reference systems need the PROJ module isohf_proj.so"));
+  EXPECT_THAT(result.out,
+              HasSubstr("map          scale not known: reference systems need the PROJ module isohf_proj.so"));
   EXPECT_FALSE(info("a.isohf").at("metadata").at("source").contains("ground"));
   const RunResult said = run_program({program, "info", folder / "a.isohf"});
   EXPECT_EQ(said.err, "");
@@ -337,7 +338,8 @@ TEST_F(MapCommand, WithoutProjsDatabaseALineSaysSo) {
       {"/usr/bin/env", "PROJ_DATA=/nonexistent", isohf_path(), "convert", folder / "web.tif", folder / "a.isohf"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.err, "");
-  EXPECT_THAT(result.out, HasSubstr("map scale    not known: the reference system EPSG:3857: PROJ finds no proj.db"));
+  EXPECT_THAT(result.out,
+              HasSubstr("map          scale not known: the reference system EPSG:3857: PROJ finds no proj.db"));
 }
 
 TEST_F(MapCommand, ExportCutsABoxOfTheInputsOwnCoordinatesOutOfAnotherMap) {

@@ -103,8 +103,8 @@ TEST_F(VoidOptions, SummarySaysHowManyVoidsThereAre) {
 }
 
 TEST_F(VoidOptions, NonsenseIsAUsageError) {
-  for (const char* option : {"--fill=0", "--fill=5000", "--valid-range=9:3", "--valid-range=7", "--nodata=-32768,far",
-                             "--nodata=40000"}) {
+  for (const char* option :
+       {"--fill=0", "--fill=5000", "--valid-range=9:3", "--valid-range=7", "--nodata=-32768,far", "--nodata=40000"}) {
     const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "b.isohf", option});
     EXPECT_EQ(result.exit_code, 2) << option;
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;

@@ -344,16 +344,4 @@ SourceFrame make_source_frame(const SourceInfo& info) {
   return make_source_frame(info, request);
 }
 
-bool drops_repeated_column(const SourceInfo& info, GroundRequest request, bool keeps_samples) {
-  if (request.wrap == Wrap::kNever || (request.wrap == Wrap::kAuto && keeps_samples)) return false;
-  GroundRequest own;
-  understand_ground(info, own);
-  if (closure_of(info, own.source_map.get()) != Closure::kRepeated) return false;
-  if (request.wrap == Wrap::kAlways) return true;
-  SourceInfo closed = info;
-  --closed.width;
-  understand_ground(closed, request);
-  return make_source_frame(closed, request).wraps_x;
-}
-
 }  // namespace isohf

@@ -56,9 +56,4 @@ enum class Closure {
 /// map  that of a source that is not in degrees, where it is understood
 [[nodiscard]] Closure closure_of(const SourceInfo& info, const ReferenceMap* map = nullptr);
 
-/// Whether the last column of a source is to go before it is laid out: it repeats the first one, and the two edges will
-/// be joined.
-/// keeps_samples  all of them are wanted back: no column goes unless joining was demanded
-[[nodiscard]] bool drops_repeated_column(const SourceInfo& info, GroundRequest request, bool keeps_samples);
-
 }  // namespace isohf

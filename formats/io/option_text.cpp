@@ -1,4 +1,4 @@
-#include "formats/option_text.h"
+#include "formats/io/option_text.h"
 
 #include <fmt/format.h>
 
