@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
@@ -83,6 +84,8 @@ RunResult run_isohf(const std::vector<std::string>& arguments, const RunOptions&
   const InDirectory here(options.folder);
   RunResult result;
   result.exit_code = cli::run(cli::kIsohf, arguments, common);
+  // A long command catches interrupts; they end the test again.
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) std::signal(number, SIG_DFL);
   result.out = out.text();
   result.err = err.text();
   return result;
