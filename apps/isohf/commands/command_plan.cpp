@@ -116,10 +116,11 @@ Report report_of(const SourceInfo& info, const Plan& plan, const MemoryPlan& mem
              fmt::format("{}: {}, {} x {} {}{}", info.path, info.format, info.width, info.height,
                          to_string(info.sample_type), info.channel.empty() ? "" : ", channel " + info.channel));
   report.add("shape", json_from(shape));
-  report.add("grid", json_from(grid), "tiles",
-             fmt::format("{} x {} of {}x{}, {} levels, aspect {:.5f}, {} triangles each", grid.tile_columns(),
-                         grid.tile_rows(), shape.columns(), shape.rows(), shape.levels(), grid.sigma_x() * std::numbers::sqrt3 / grid.sigma_z(),
-                         describe_count(shape.triangle_count())));
+  report.add(
+      "grid", json_from(grid), "tiles",
+      fmt::format("{} x {} of {}x{}, {} levels, aspect {:.5f}, {} triangles each", grid.tile_columns(),
+                  grid.tile_rows(), shape.columns(), shape.rows(), shape.levels(),
+                  grid.sigma_x() * std::numbers::sqrt3 / grid.sigma_z(), describe_count(shape.triangle_count())));
   report.add("density", plan.density, "lattice",
              fmt::format("columns {} apart, rows {}; {:.4g} vertices per sample", length(2.0 * grid.sigma_x()),
                          length(grid.sigma_z()), plan.density));
