@@ -13,9 +13,9 @@
 #include "isohf/raster.h"
 #include "opening.h"
 #include "options/describe.h"
-#include "output/json_output.h"
 #include "output/output_file.h"
 #include "output/progress.h"
+#include "output/report.h"
 #include "output/standard_output.h"
 #include "program.h"
 #include "session.h"
@@ -47,68 +47,62 @@ int take_screenshot(const TileSource& source, const Options& options) {
                     options.memory_mib, session.boxes().figures().radius));
   }
   session.keep(target, options, options.screenshot);
-  print_result(options.common, "", [&] {
-    return ordered_json{{"archive", options.archive}, {"screenshot", options.screenshot},
-                        {"driver", driver_name()},    {"width", target.width()},
-                        {"height", target.height()},  {"exaggeration", session.view.exaggeration},
-                        {"cut", session.is_cut()}};
-  });
+  cli::Report({{"archive", options.archive},
+               {"screenshot", options.screenshot},
+               {"driver", driver_name()},
+               {"width", target.width()},
+               {"height", target.height()},
+               {"exaggeration", session.view.exaggeration},
+               {"cut", session.is_cut()}})
+      .print(options.common);
   return cli::kExitDone;
 }
 
-std::string text_from(const ViewReport& report, const std::string& archive) {
-  std::string text = fmt::format(
-      "{} tiles, {} pictures, {} pixels, {} vertices, {} shared vertices\n"
-      "worst height {:.4f} codes, worst normal {:.2e}\n",
-      report.tiles, cli::describe_count(report.pictures), cli::describe_count(report.pixels),
-      cli::describe_count(report.vertices), cli::describe_count(report.shared_vertices), report.worst_height,
-      report.worst_normal);
-  if (report.suns_deg.empty()) {
-    text += "shadows: not looked at, as tiles are at fault\n";
-  } else {
-    text += fmt::format(
-        "shadows: suns of {:g} degrees, East and West, {} vertices, {} of them from seeds, worst {:.2e} of the sun\n",
-        fmt::join(report.suns_deg, ", "), cli::describe_count(report.shadow_vertices),
-        cli::describe_count(report.seeded_vertices), report.worst_shadow);
-  }
-  if (report.passed()) return text + archive + ": archive, index arrays and shaders agree\n";
-  for (const ViewFinding& found : report.findings) {
-    text += fmt::format("{} {}: tile ({},{}), level {:g}: {}; worst {:g}, {} place{}\n", finding_name(found.id),
-                        check_name(found.id), found.tile.column, found.tile.row, found.level, found.where,
-                        found.deviation, found.count, found.count == 1 ? "" : "s");
-  }
-  const auto shown = static_cast<std::int64_t>(report.findings.size());
-  if (report.failures > shown) text += fmt::format("and {} more\n", report.failures - shown);
-  return text;
-}
-
-ordered_json json_from(const ViewReport& report, const std::string& archive) {
+cli::Report report_of(const ViewReport& found, const std::string& archive) {
+  cli::Report report({{"archive", archive}, {"passed", found.passed()}});
+  report.add("tiles", found.tiles, "tiles",
+             fmt::format("{}, {} pictures of {} pixels in all", found.tiles, cli::describe_count(found.pictures),
+                         cli::describe_count(found.pixels)));
+  report.add("pictures", found.pictures);
+  report.add("pixels", found.pixels);
+  report.add("vertices", found.vertices, "vertices",
+             fmt::format("{}, {} of them shared; worst height {:.4f} codes, worst normal {:.2e}",
+                         cli::describe_count(found.vertices), cli::describe_count(found.shared_vertices),
+                         found.worst_height, found.worst_normal));
+  report.add("shared_vertices", found.shared_vertices);
+  report.add("worst_height_codes", found.worst_height);
+  report.add("worst_normal", found.worst_normal);
+  report.add(
+      "suns_deg", found.suns_deg, "shadows",
+      found.suns_deg.empty()
+          ? "not looked at, as tiles are at fault"
+          : fmt::format("suns of {:g} degrees, East and West; {} vertices, {} of them from seeds, worst {:.2e} of "
+                        "the sun",
+                        fmt::join(found.suns_deg, ", "), cli::describe_count(found.shadow_vertices),
+                        cli::describe_count(found.seeded_vertices), found.worst_shadow));
+  report.add("shadow_vertices", found.shadow_vertices);
+  report.add("seeded_vertices", found.seeded_vertices);
+  report.add("worst_shadow", found.worst_shadow);
+  report.add("failures", found.failures);
   ordered_json findings = ordered_json::array();
-  for (const ViewFinding& found : report.findings) {
-    findings.push_back({{"id", finding_name(found.id)},
-                        {"check", check_name(found.id)},
-                        {"column", found.tile.column},
-                        {"row", found.tile.row},
-                        {"level", found.level},
-                        {"where", found.where},
-                        {"worst", found.deviation},
-                        {"places", found.count}});
+  for (const ViewFinding& one : found.findings) {
+    findings.push_back({{"id", finding_name(one.id)},
+                        {"check", check_name(one.id)},
+                        {"column", one.tile.column},
+                        {"row", one.tile.row},
+                        {"level", one.level},
+                        {"where", one.where},
+                        {"worst", one.deviation},
+                        {"places", one.count}});
+    report.line(finding_name(one.id),
+                fmt::format("{}: tile ({},{}), level {:g}: {}; worst {:g} at {} places", check_name(one.id),
+                            one.tile.column, one.tile.row, one.level, one.where, one.deviation, one.count));
   }
-  return {{"archive", archive},
-          {"passed", report.passed()},
-          {"tiles", report.tiles},
-          {"pictures", report.pictures},
-          {"pixels", report.pixels},
-          {"vertices", report.vertices},
-          {"shared_vertices", report.shared_vertices},
-          {"worst_height_codes", report.worst_height},
-          {"worst_normal", report.worst_normal},
-          {"suns_deg", report.suns_deg},
-          {"shadow_vertices", report.shadow_vertices},
-          {"seeded_vertices", report.seeded_vertices},
-          {"worst_shadow", report.worst_shadow},
-          {"failures", report.failures},
-          {"findings", findings}};
+  report.add("findings", findings);
+  const auto not_listed = found.failures - static_cast<std::int64_t>(found.findings.size());
+  if (not_listed > 0) report.line("", fmt::format("and {} more", not_listed));
+  if (found.passed()) report.line("result", archive + ": archive, index arrays and shaders agree");
+  return report;
 }
 
 int verify(const TileSource& source, const Options& options) {
@@ -128,7 +122,7 @@ int verify(const TileSource& source, const Options& options) {
   };
   const ViewReport report = verify_view(source, make_index_arrays(grid.shape()), wanted);
   display.clear();
-  print_result(options.common, text_from(report, options.archive), [&] { return json_from(report, options.archive); });
+  report_of(report, options.archive).print(options.common);
   return report.passed() ? cli::kExitDone : cli::kExitDifferences;
 }
 
@@ -163,17 +157,6 @@ constexpr cli::Program kView = {"isohf-view", "Explore an archive or raster in 3
                                 kCommands};
 
 }  // namespace
-
-void print_result(const cli::Common& common, const std::string& text, const std::function<ordered_json()>& json) {
-  cli::StandardOutput out(common);
-  if (common.json) {
-    out.write(cli::json_text(json()));
-  } else if (!common.quiet) {
-    out.write(text);
-  }
-  out.finish();
-}
-
 }  // namespace isohf::view
 
 int main(int argc, char** argv) {

@@ -21,6 +21,7 @@
 #include "interrupt.h"
 #include "isohf/error.h"
 #include "opening.h"
+#include "output/report.h"
 #include "output/standard_output.h"
 #include "reading/place.h"
 #include "session.h"
@@ -431,23 +432,22 @@ void run_window(const Options& options) {
     glfwSwapBuffers(window.get());
   }
   if (!options.common.json) return;
-  print_result(options.common, "", [&] {
-    const Camera& camera = session.camera;
-    const Vec3 eye = session.eye_in_archive();
-    const std::optional<Place> place = controls.under_cursor();
-    constexpr double kDegrees = 180.0 / std::numbers::pi;
-    return nlohmann::ordered_json{{"archive", options.archive},
-                                  {"eye", {eye.x, eye.y, eye.z}},
-                                  {"heading_deg", camera.heading_rad * kDegrees},
-                                  {"pitch_deg", camera.pitch_rad * kDegrees},
-                                  {"exaggeration", session.view.exaggeration},
-                                  {"under_cursor", place ? json_of(*place) : nlohmann::ordered_json()},
-                                  {"height_above_ground", controls.height_above_ground()},
-                                  {"sun_azimuth_deg", session.sun_azimuth_deg},
-                                  {"sun_elevation_deg", session.sun_elevation_deg},
-                                  {"triangles", session.figures().triangles},
-                                  {"frames", drawn}};
-  });
+  const Camera& camera = session.camera;
+  const Vec3 eye = session.eye_in_archive();
+  const std::optional<Place> place = controls.under_cursor();
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
+  cli::Report({{"archive", options.archive},
+               {"eye", {eye.x, eye.y, eye.z}},
+               {"heading_deg", camera.heading_rad * kDegrees},
+               {"pitch_deg", camera.pitch_rad * kDegrees},
+               {"exaggeration", session.view.exaggeration},
+               {"under_cursor", place ? json_of(*place) : nlohmann::ordered_json()},
+               {"height_above_ground", controls.height_above_ground()},
+               {"sun_azimuth_deg", session.sun_azimuth_deg},
+               {"sun_elevation_deg", session.sun_elevation_deg},
+               {"triangles", session.figures().triangles},
+               {"frames", drawn}})
+      .print(options.common);
 }
 
 }  // namespace isohf::view

@@ -12,6 +12,9 @@ namespace isohf::cli {
 /// What a command has to say, once: printed as lines of text, or with --json as a document.
 class Report {
  public:
+  /// json  members that come first
+  explicit Report(nlohmann::ordered_json json = nlohmann::ordered_json::object()) : json_(std::move(json)) {}
+
   /// A member of the document, and the line that says the same: "label        words". Without words there is no line.
   void add(const std::string& key, nlohmann::ordered_json value, const std::string& label = {},
            std::string words = {}) {
@@ -35,7 +38,7 @@ class Report {
     std::string words;
     bool is_detail;
   };
-  nlohmann::ordered_json json_ = nlohmann::ordered_json::object();
+  nlohmann::ordered_json json_;
   std::vector<Line> lines_;
 };
 
