@@ -99,17 +99,9 @@ void add_picture(CLI::App& line, Options& options) {
                           "Colours [default: texture if the archive has textures, else elevation]", options.mode);
   cli::option(line, "--palette", "elevation|gray|mars", "Colours of elevations [default: those of its body]",
               [&options](const std::string& text) { options.palette = cli::parse_palette(text); });
-  cli::option(line, "--level", "L[,L2]",
-              "Draw every tile at this level of detail, 0 to 12, fractional; two levels alternate like a chessboard",
-              [&options](const std::string& text) {
-                const std::vector<double> levels = cli::parse_numbers(text);
-                const auto is_level = [](double level) { return level >= 0.0 && level <= 12.0; };
-                if (levels.size() > 2 || !is_level(levels.front()) || !is_level(levels.back())) {
-                  refuse(text, "one or two numbers from 0 to 12");
-                }
-                options.view.fixed_level = levels.front();
-                if (levels.size() == 2) options.view.other_level = levels.back();
-              });
+  cli::option(
+      line, "--level", "L", "Draw every tile at this level of detail, 0 to 12, fractional",
+      [&options](const std::string& text) { options.view.fixed_level = cli::parse_number_in(text, 0.0, 12.0); });
   cli::option(
       line, "--triangle-size", "A", "Draw triangles of about A square pixels; more is faster [default: 4]",
       [&options](const std::string& text) { options.view.triangle_px = cli::parse_number_in(text, 0.01, 1e6); });

@@ -209,10 +209,7 @@ const TerrainProgram& Renderer::shading(ColourMode mode) {
 double Renderer::level_of(const ViewState& view, PlaneTile at) const {
   const TileGrid& grid = planes_.grid(at.plane);
   const int levels = planes_.levels();
-  if (view.fixed_level) {
-    const bool second = view.other_level && (at.tile.column + at.tile.row) % 2 != 0;
-    return std::clamp(second ? *view.other_level : *view.fixed_level, 0.0, static_cast<double>(levels - 1));
-  }
+  if (view.fixed_level) return std::clamp(*view.fixed_level, 0.0, static_cast<double>(levels - 1));
   // Section 3.9, with the straight distance in place of camera-space depth: turning the head changes no mesh.
   const TileVolume box = tile_volume(grid, at.tile, source_.plane(at.plane).bounds(at.tile), view);
   const double distance = at.plane == 0 ? length(0.5 * (box.low + box.high)) : box.distance();

@@ -75,11 +75,9 @@ Session::Session(const TileSource& source, const Options& options)
       boxes_(source, shared_, limits_from(source, options), workers_),
       far_distance_(options.far_distance) {
   const int levels = planes_of(source).levels();
-  for (const std::optional<double>& level : {view.fixed_level, view.other_level}) {
-    if (level && *level > levels - 1) {
-      throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("--level {}: this archive has levels 0 to {}", *level, levels - 1));
-    }
+  if (const auto& level = view.fixed_level; level && *level > levels - 1) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("--level {}: this archive has levels 0 to {}", *level, levels - 1));
   }
   view.exaggeration = options.exaggeration.value_or(default_exaggeration(source));
   if (source.textures() != nullptr) {

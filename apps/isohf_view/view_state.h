@@ -22,7 +22,6 @@ struct ViewState {
   ColourMode mode = ColourMode::kElevation;
   bool wireframe = false;
   std::optional<double> fixed_level;  ///< draws every tile at this fractional level
-  std::optional<double> other_level;  ///< of every second tile, like a chessboard; with fixed_level
   double triangle_px = 4.0;           ///< area that triangles are meant to have, pixels (section 3.9)
   int width = 1280;                   ///< pixels
   int height = 720;

@@ -17,6 +17,7 @@
 #include "formats/georeference/archive_coordinates.h"
 #include "input/options_source.h"
 #include "isohf/archive.h"
+#include "isohf/base/arena.h"
 #include "isohf/error.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
@@ -26,7 +27,6 @@
 #include "options/work_options.h"
 #include "output/json_output.h"
 #include "output/standard_output.h"
-#include "work_arena.h"
 
 namespace isohf::cli {
 namespace {
@@ -259,8 +259,7 @@ int run(SampleOptions options) {
   options.sun = sun_over(archive, options.date, options.sun);
   const WorldBounds& covered = archive.metadata().valid;
   std::optional<MapPoint> outside;  // the first such place, as it was typed
-  WorkArena threads(options.threads);
-  threads.execute([&] {
+  Arena(Job{.threads = options.threads}).execute([&] {
     Answers answers(archive, options, with);
     const auto take = [&](MapPoint typed) {
       const WorldPoint place = in.to_world(typed);

@@ -10,11 +10,11 @@
 #include "formats/adapters/windowed_source.h"
 #include "input/options_source.h"
 #include "isohf/archive/container/content_hash.h"
+#include "isohf/base/arena.h"
 #include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
 #include "options/command_line.h"
 #include "options/option_values.h"
-#include "work_arena.h"
 
 namespace isohf::cli {
 namespace {
@@ -146,8 +146,8 @@ OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inp
   if (files.size() == 1) {
     opened.source = open_raster(files.front(), options);
   } else {
-    MosaicPlan plan =
-        WorkArena(work.threads).execute([&] { return plan_mosaic(files, options, inputs.box, inputs.onto); });
+    MosaicPlan plan;
+    Arena(Job{.threads = work.threads}).execute([&] { plan = plan_mosaic(files, options, inputs.box, inputs.onto); });
     opened.is_reprojected = plan.is_reprojected;
     opened.note.name = fmt::format("mosaic of {} files", files.size());
     describe_mosaic(plan, inputs.overlap, opened.note);

@@ -33,7 +33,7 @@ std::optional<double> PlaneBoxes::radius(int plane, const ViewState& view, doubl
   const double level = step * (plane + 1.0);
   double distance = 0.0;  // nearer than that a tile of the next plane gives way
   if (view.fixed_level) {
-    distance = std::min(*view.fixed_level, view.other_level.value_or(level)) < level ? reach : 0.0;
+    distance = *view.fixed_level < level ? reach : 0.0;
   } else {
     distance = view.focal_px() * std::exp2(level) * std::sqrt(triangle_area(source_.grid(), 1.0) / view.triangle_px);
   }
