@@ -54,7 +54,7 @@ void look_ahead(const Arguments& arguments, Common& common) {
 void add_common(CLI::App& root, Common& common) {
   root.add_flag("--json", common.json, "Print one JSON document instead of text, errors included");
   root.add_flag("-q,--quiet", common.quiet, "Print only errors, and warnings of lost data");
-  root.add_flag("-v,--verbose", common.verbose, "Print more, to standard error");
+  root.add_flag("-v,--verbose", common.verbose, "Print more");
   root.add_flag("--strict", common.strict, "Treat warnings as errors: write nothing");
 }
 
@@ -70,6 +70,9 @@ std::vector<std::string> words_for_parser(const Arguments& arguments) {
   const auto files = std::ranges::find(arguments, "--");
   for (auto word = arguments.begin(); word != arguments.end(); ++word) {
     if (word == files) continue;
+    // GDAL's -of and -outsize would be an output called "f".
+    if (word < files && word->starts_with("-o") && word->size() > 2)
+      throw Error(ErrorCode::kInvalidArgument, "unknown option " + *word + "; -o OUTPUT takes its value after a blank");
     const bool is_file = word > files && word->starts_with('-') && *word != "-";
     const bool is_list = word->starts_with('[') && word->ends_with(']');
     const bool is_empty = word < files && word->starts_with("--") && word->find('=') + 1 == word->size();
@@ -102,7 +105,9 @@ void refuse_extras(const CLI::App& root, const CLI::App& line) {
   const auto option = std::ranges::find_if(extras, [](const auto& word) { return word.size() > 1 && word[0] == '-'; });
   if (option != extras.end()) {
     const std::string name = option->substr(0, option->find('='));
-    refuse_usage(line, fmt::format("unknown option {}{}", name, did_you_mean(name, long_names(line, root))));
+    const std::vector<std::string> known = long_names(line, root);
+    if (std::ranges::find(known, name) != known.end()) refuse_usage(line, name + " must follow the command");
+    refuse_usage(line, fmt::format("unknown option {}{}", name, did_you_mean(name, known)));
   }
   const std::string& word = extras.front();
   if (line.get_subcommands({}).empty()) refuse_usage(line, fmt::format("'{}' is one argument too many", word));
@@ -170,8 +175,14 @@ void run_other_program(const Program& program, const Arguments& arguments) {
 
 int parse_and_run(const Program& program, Arguments arguments, Common& common) {
   // "help convert" is "convert --help".
-  if (program.has_commands() && !arguments.empty() && arguments.front() == "help")
+  if (program.has_commands() && !arguments.empty() && arguments.front() == "help") {
+    std::vector<std::string> names;
+    for (const Command& command : program.commands) names.emplace_back(command.name);
+    if (arguments.size() > 1 && !arguments[1].starts_with('-') && std::ranges::find(names, arguments[1]) == names.end())
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("unknown command '{}'{}", arguments[1], did_you_mean(arguments[1], names)));
     *std::rotate(arguments.begin(), arguments.begin() + 1, arguments.end()) = "--help";
+  }
   run_other_program(program, arguments);
   // The plain twins of vectorised code, for tests and for finding faults.
   const char* const simd = std::getenv("ISOHF_SIMD");

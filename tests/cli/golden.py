@@ -29,7 +29,7 @@ RASTERS = {"coast.tif": "coast_512x384_int16.tif", "voids.tif": "voids_200x150_i
            "ridges.exr": "ridges_161x161_float.exr", "peaks.png": "peaks_256x256_uint16.png"}
 MASKS = [(r"\b\d+(\.\d+)? (ms|s)\b", "<s>"),
          (r"\b(isohf|isohf-view|libtiff|libpng|OpenEXR|OpenImageIO|zlib|PROJ) \d+(\.\d+)+", r"\1 <version>"),
-         (r"[0-9.]+ million input samples a second", "<rate>"),
+         (r"[0-9.]+ million samples a second, [0-9.]+ MB of memory", "<rate>"),
          (r"\b\d+(\.\d+)? (bytes|kB|MB|GB)\b(?! as raw| take| of)", "<size>"),
          (r"[0-9.]+ bits a source sample: [0-9.]+ times", "<ratio>"),
          (r'("(archive_)?bytes"): \d+', r"\1: <size>"),

@@ -284,7 +284,7 @@ TEST(EachOnAFullDisk, BeginsNoOtherFileAndSaysSoOnce) {
   EXPECT_THAT(result.err, testing::HasSubstr("a.isohf: "));
   EXPECT_THAT(result.err, testing::HasSubstr(std::strerror(ENOSPC)));
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  EXPECT_THAT(result.out, testing::StartsWith("4 files: 0 converted, 1 failed, 3 not done in "));
+  EXPECT_THAT(result.out, testing::StartsWith("files        4: 0 converted, 1 failed, 3 not done in "));
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Faults, testing::ValuesIn(jobs()), [](const auto& test) { return test.param.name; });

@@ -8,9 +8,8 @@ def counts(source, *options):
     """Clamped and all vertices, which must be the same in the warning, the summary, `info` and JSON."""
     made = isohf("convert", source, "c.isohf", "--overwrite", "--clamp-range", *options)
     warned = re.search(r"(\d+) of (\d+) lattice vertices lay outside", made.err)
-    told = re.search(r"^clamped +([\d ]+) vertices moved", made.out, re.MULTILINE)
-    shown = re.search(r"^vertices +([\d ]+) on the source's ground, ([\d ]+) void(?:, ([\d ]+) moved)?",
-                      isohf("info", "c.isohf").out, re.MULTILINE)
+    told = re.search(r"([\d ]+) vertices clamped", made.out)
+    shown = re.search(r"([\d ]+) vertices clamped", isohf("info", "c.isohf", "-v").out)
     number = lambda text: int(text.replace(" ", ""))
     statistics = isohf("info", "c.isohf", "--json").json()["metadata"]["statistics"]
     clamped, all_ = statistics["clamped"], statistics["vertices"]
@@ -20,8 +19,7 @@ def counts(source, *options):
     if clamped > 0:
         check((int(warned[1]), int(warned[2])) == (clamped, all_), f"{what}: {made.err}, but {clamped} of {all_}")
         check(number(told[1]) == clamped, f"{what}: {told[0]}, but {clamped}")
-        check(number(shown[3]) == clamped, f"{what}: {shown[0]}, but {clamped}")
-    check(number(shown[1]) == all_, f"{what}: {shown[0]}, but {all_}")
+        check(number(shown[1]) == clamped, f"{what}: {shown[0]}, but {clamped}")
     return clamped, all_, statistics["voids"]
 
 

@@ -34,7 +34,7 @@ for kind in KINDS:
     before = names(there)
     check(len(names(there, f".{kind}")) == 16, f"{kind}: {before}")
     text = isohf("export", "b.isohf", output, *NEW, "--overwrite").out
-    check("12 tiles of another cut removed" in text, text)
+    check("12 of another cut removed" in text, text)
     fresh = folder(f"fresh_{kind}")
     isohf("export", "b.isohf", fresh / f"u.{kind}", *NEW, "-q")
     check(contents(there) == contents(fresh), f"{kind}: {names(there)}, must be {names(fresh)}")

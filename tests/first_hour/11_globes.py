@@ -42,11 +42,11 @@ for number, (what, layout) in enumerate(GLOBES.items()):
     globe(name + ".tif", epsg=4326, **layout)
     for more in ((), ("--to-crs", "none"), ("--filter", "bspline3", "--shadow-seeds")):
         made = isohf("convert", name + ".tif", name + ".isohf", "--overwrite", *more)
-        check("joins" in made.out and made.err == "", f"{what} {more}: {made.out}{made.err}")
+        check("the East edge" in made.out and made.err == "", f"{what} {more}: {made.out}{made.err}")
         ends_meet(name + ".isohf", f"{what} {more}")
     isohf("verify", name + ".isohf", "--against", name + ".tif", "-q")
-    check("joins" in isohf("plan", name + ".tif").out, f"{what}: plan does not say that it is joined")
-    check("joins" in isohf("info", name + ".isohf").out, f"{what}: info does not say that it is joined")
+    check("the East edge" in isohf("plan", name + ".tif").out, f"{what}: plan does not say that it is joined")
+    check("the East edge" in isohf("info", name + ".isohf").out, f"{what}: info does not say that it is joined")
     same = isohf("convert", name + ".tif", name + ".isohf", "--resume", "--filter", "bspline3", "--shadow-seeds")
     check("complete already" in same.out, f"{what}: {same.out}")
     refuses("convert", name + ".tif", name + ".isohf", "--resume", "--filter", "bspline3", "--shadow-seeds",
@@ -57,7 +57,7 @@ for number, (what, layout) in enumerate(GLOBES.items()):
     isohf("convert", name + ".tif", "demanded.isohf", "--overwrite", "-q", "--wrap-x")
     check((FOLDER / (name + ".isohf")).read_bytes() == (FOLDER / "demanded.isohf").read_bytes(), f"{what}: --wrap-x")
     opened = isohf("convert", name + ".tif", "open.isohf", "--overwrite", "--no-wrap")
-    check("joins" not in opened.out, f"{what}: --no-wrap joins")
+    check("the East edge" not in opened.out, f"{what}: --no-wrap joins")
     isohf("verify", "open.isohf", "--against", name + ".tif", "-q")
 
 # What comes out of a joined archive.
@@ -90,14 +90,14 @@ isohf("convert", "west.tif", "east.tif", "halves.isohf", "-q")
 ends_meet("halves.isohf", "two halves")
 isohf("verify", "halves.isohf", "--against", "west.tif", "--against", "east.tif", "-q")
 part = isohf("convert", "globe1.tif", "part.isohf", "--bbox", "-90,-60,90,60")
-check("joins" not in part.out, "a part is joined")
+check("the East edge" not in part.out, "a part is joined")
 refuses("convert", "globe1.tif", "part.isohf", "--bbox", "-90,-60,90,60", "--wrap-x", "--overwrite",
         words=["columns all the way round", "180"], code=2)
 belt = isohf("convert", "globe1.tif", "belt.isohf", "--bbox", "-180,-60,180,60")
-check("joins" in belt.out, "a belt all the way round is not joined")
+check("the East edge" in belt.out, "a belt all the way round is not joined")
 ends_meet("belt.isohf", "a belt")
 cap = isohf("convert", "globe1.tif", "cap.isohf", "--bbox", "-180,60,180,90")
-check("polar-stereographic" in cap.out and "joins" not in cap.out, "a cap is joined")
+check("polar-stereographic" in cap.out and "the East edge" not in cap.out, "a cap is joined")
 refuses("convert", "globe1.tif", "both.isohf", "--wrap-x", "--no-wrap", words=["--wrap-x", "--no-wrap"], code=2)
 
 # Other bodies, and metres of a cylindrical map.
@@ -110,7 +110,7 @@ write_tiff("mars.tif", COLUMNS, ROWS, lambda c, r: ground(-177.5 + c * STEP, 87.
                                  'PARAMETER["standard_parallel_1",0],PARAMETER["central_meridian",0],'
                                  'PARAMETER["false_easting",0],PARAMETER["false_northing",0],UNIT["metre",1]]')
 made = isohf("convert", "mars.tif", "mars.isohf")
-check("joins" in made.out, f"a cylindrical map of Mars is open: {made.out}{made.err}")
+check("the East edge" in made.out, f"a cylindrical map of Mars is open: {made.out}{made.err}")
 ends_meet("mars.isohf", "a cylindrical map of Mars")
 isohf("verify", "mars.isohf", "--against", "mars.tif", "-q")
 
@@ -125,6 +125,6 @@ if mola:
 etopo = real("ETOPO1_1deg.tif")
 if etopo:
     made = isohf("convert", etopo, "etopo.isohf")
-    check("joins" in made.out, f"ETOPO1 is open: {made.out}")
+    check("the East edge" in made.out, f"ETOPO1 is open: {made.out}")
     at = sample("etopo.isohf", [(-180, 10), (180, 10), (540, 10)], "--in", "lonlat")
     check(len(set(at)) == 1, f"ETOPO1 at longitude 180: {at}")

@@ -31,7 +31,7 @@ for name, body, radius in (("mars", "Mars", MARS), ("moon", "Moon", MOON)):
     globe(name, body, radius)
     for code in ("ESRI:54009", "+proj=moll", "mollweide.prj"):
         made = isohf("convert", name + ".tif", name + ".isohf", "--overwrite", "--to-crs", code)
-        line = next(line for line in made.out.splitlines() if line.startswith("projection"))
+        line = next(line for line in made.out.splitlines() if line.startswith("map"))
         check(body in line and "in place of the Earth" in line, f"{code} on {body}: {line}")
         check(made.err == "", made.err)
         metadata = isohf("info", name + ".isohf", "--json").json()["metadata"]

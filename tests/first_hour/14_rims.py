@@ -61,7 +61,7 @@ def main():
     check((FOLDER / "m.isohf").read_bytes() == bytes_, "shards: other bytes")
     # On a lattice much coarser than the samples some have none: `convert` reports them.
     text = isohf("convert", "coast.asc", "v.isohf", "--density", "0.001").out
-    check("beside voids have no surface" in text, text)
+    check("next to nodata have no surface" in text, text)
 
     for name in ("hugo_site.asc", "west_bijou_gully.asc", "N49E001.hgt", "mt_fuji_90m.tif", "N2000000E3000000.TIF"):
         if real(name):

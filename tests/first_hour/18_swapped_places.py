@@ -50,7 +50,7 @@ for archive, longitude, latitude in (("utm.isohf", 7.76, 45.12), ("south.isohf",
     check("outside" not in right.out and not right.err, f"{right.command}: {right.out}{right.err}")
     result = hinted(archive, at(latitude, longitude, "lonlat"), ["latitude, longitude", f"--at {longitude:g},{latitude:g} --in lonlat"])
     check(result.out == "outside\n", f"{result.command} prints {result.out}")
-    hinted(archive, ["--in", "lonlat"], ["latitude, longitude"], stdin=f"0 0\n{longitude} {latitude}\n{latitude} {longitude}\n")
+    hinted(archive, ["--in", "lonlat"], ["latitude, longitude"], stdin=f"{longitude} {latitude}\n{latitude} {longitude}\n0 0\n")
     # Degrees where coordinates of the input, or of the world, are read.
     if archive != "degrees.isohf":
         hinted(archive, at(longitude, latitude, "crs"), ["longitude, latitude", "--in lonlat"])

@@ -65,7 +65,7 @@ except PermissionError:
 (rasters / "bad.asc").write_text("ncols 2\nnrows 2\ncellsize 1\n1 2 three 4\n")
 result = isohf("convert", "rasters", "--out-dir", "made", "--keep-going", code=1)
 check((result.out + result.err).count("bad.asc") == 1, result.out + result.err)
-check(result.out.startswith("41 files: 40 converted, 1 failed in "), result.out)
+check(result.out.splitlines()[-1].startswith("files        41: 40 converted, 1 failed in "), result.out)
 (rasters / "bad.asc").unlink()
 
 # 3. A file of nodata alone does not stop the others and is no failure.
@@ -83,7 +83,7 @@ check((summary["converted"], summary["nodata"], summary["failed"], summary["not_
 check(result.err.count("\n") == 1 and "b_sea" in result.err, result.err)
 check(sorted(path.name for path in (FOLDER / "tiles").iterdir()) == ["a.isohf", "c.isohf"], "archives of the tiles")
 result = isohf("convert", sea, "--out-dir", "tiles", "--resume")
-check(result.out.startswith("3 files: 0 converted, 2 complete before, 1 of nodata alone in "), result.out)
+check(result.out.splitlines()[-1].startswith("files        3: 0 converted, 2 complete before, 1 of nodata alone in "), result.out)
 check(isohf("convert", *(path for path in sorted(sea.iterdir()) if "sea" in path.name), "-o", "sea.isohf", code=1).out == "", "alone")
 
 # 4. A forgotten --resume keeps what the interrupted run has done: interrupted at once, the next run can still have it.
@@ -122,14 +122,13 @@ check(isohf("verify", "noise.isohf", "-q").code == 0, "the resumed archive")
 
 # 5. Archives that have nothing in common: the reason, and how many members differ.
 result = isohf("diff", "coast.isohf", "peaks.isohf", code=3)
-lines = result.out.splitlines()
-check(len(lines) == 2 and "peaks.isohf has " in lines[0] and " tiles of " in lines[0], result.out)
+check(len(result.out.splitlines()) == 2 and "peaks.isohf has " in result.out and " tiles of " in result.out, result.out)
 members = isohf("diff", "coast.isohf", "peaks.isohf", "--json", code=3).json()["metadata"]
-check(len(members) > 20 and f" {len(members)} members differ" in lines[1], result.out)
+check(len(members) > 20 and f" {len(members)} members differ" in result.out, result.out)
 isohf("convert", write_asc("here.asc", 90, 80, lambda x, y: x + y, west=0.0), "here.isohf", "-q")
 isohf("convert", write_asc("there.asc", 90, 80, lambda x, y: x + y, west=5000.0), "there.isohf", "-q")
 lines = isohf("diff", "here.isohf", "there.isohf", code=3).out.splitlines()
-check(len(lines) == 2 and "other ground" in lines[0], f"{lines}")
+check(len(lines) == 2 and any("other ground" in line for line in lines), f"{lines}")
 
 # 6. merge: what to do with what are no shards of one conversion; and it writes to -o alone.
 JOINS = "merge joins the shards of one conversion; convert the rasters together instead"
@@ -140,8 +139,8 @@ for number in (1, 2):
 isohf("convert", PEAKS, "-o", "alien.isohf", "--shard", "2/2", "--z-range", "-1000:70000", "--shape", 3000, "-q")
 refuses("merge", "s1.isohf", "alien.isohf", "-o", "both.isohf", words=["alien.isohf: is a shard of another conversion", JOINS], code=2)
 before = (FOLDER / "s2.isohf").read_bytes()
-refuses("merge", "s1.isohf", "s2.isohf", words=["no OUTPUT given (-o)"], code=2)
-refuses("merge", "s1.isohf", "s2.isohf", "--overwrite", words=["no OUTPUT given (-o)"], code=2)
+refuses("merge", "s1.isohf", "s2.isohf", words=["no OUTPUT given"], code=2)
+refuses("merge", "s1.isohf", "s2.isohf", "--overwrite", words=["no OUTPUT given"], code=2)
 refuses("merge", "s1.isohf", "s2.isohf", "-o", "s2.isohf", "--overwrite", words=["s2.isohf"], code=2)
 check((FOLDER / "s2.isohf").read_bytes() == before, "merge wrote over its last shard")
 isohf("merge", "s1.isohf", "s2.isohf", "-o", "whole.isohf", "-q")

@@ -176,17 +176,17 @@ TEST_F(ViewProgramTest, RefusesInOneLine) {
            {path("text.isohf") + " --verify", 1, "text.isohf"},
            {good + " --verify", 1, "OpenGL 3.3", "MESA_GL_VERSION_OVERRIDE=2.1"},
            {good, 1, "; --screenshot PICTURE.png draws without one\n", "env -u DISPLAY -u WAYLAND_DISPLAY"},
-           {"", 2, "isohf-view: no ARCHIVE given (usage: isohf-view ARCHIVE [options])"},
+           {"", 2, "isohf-view: no ARCHIVE given"},
            {good + " --verfy", 2, "isohf-view: unknown option --verfy; did you mean --verify?"},
            {good + " --verify --tiles 2:4,0:1", 2, "--tiles: the archive has 3 by 2 tiles"},
-           {good + " --tiles 2:3,0:1", 2, "--tiles needs --verify"},
+           {good + " --tiles 2:3,0:1", 2, "--tiles requires --verify"},
            {good + " --level 9" + shot, 2, "--level 9: "},
-           {good + " --sun 3" + shot, 2, "--sun: found '3', must be AZIMUTH,ELEVATION"},
+           {good + " --sun 3" + shot, 2, "--sun: found '3', must be AZ,EL"},
            {good + " --date 2026-06-21" + shot, 2, "--date: "},
-           {good + " --time 12:00" + shot, 2, "--time needs --date"},
+           {good + " --time 12:00" + shot, 2, "--time requires --date"},
            {good + " --sun 1,2 --date 2026-06-21" + shot, 2, "--sun excludes --date"},
            {good + " --size 64x48 --legend" + shot, 2, "--legend needs pictures of at least"},
-           {good + " --legend --verify", 2, "--legend needs --screenshot"},
+           {good + " --legend --verify", 2, "--legend requires --screenshot"},
            {good + " --palette pink" + shot, 2, "--palette: "}}) {
     SCOPED_TRACE(one.before + " " + one.arguments);
     const Outcome outcome = run(one.arguments, one.before);
@@ -200,8 +200,8 @@ TEST_F(ViewProgramTest, RefusesInOneLine) {
 TEST_F(ViewProgramTest, HelpAndVersionAreThoseOfEveryCommand) {
   const Outcome help = run("--help");
   EXPECT_EQ(help.exit_code, 0);
-  EXPECT_NE(help.out.find("Usage: isohf-view ARCHIVE [options]\n"), std::string::npos);
-  EXPECT_NE(help.out.find("\nCommon:\n"), std::string::npos);
+  EXPECT_NE(help.out.find("Usage: isohf-view ARCHIVE [OPTIONS]\n"), std::string::npos);
+  EXPECT_NE(help.out.find("\nOptions of every command:\n"), std::string::npos);
   EXPECT_EQ(run("-V").out.rfind("isohf-view ", 0), 0U);
 }
 
@@ -307,7 +307,7 @@ TEST_F(ViewProgramTest, ReadsItsPartOfAConfigFileForAllCommands) {
   test::write_file(path("wrong.toml"), "[view]\nsiez = \"64x48\"\n");
   const Outcome wrong = run(path("good.isohf") + " --config " + path("wrong.toml"));
   EXPECT_EQ(wrong.exit_code, 2);
-  EXPECT_NE(wrong.err.find("wrong.toml:2: view has no option 'siez'; did you mean size?"), std::string::npos)
+  EXPECT_NE(wrong.err.find("wrong.toml:2: view has no option 'siez'; did you mean --size?"), std::string::npos)
       << wrong.err;
 }
 
@@ -435,6 +435,8 @@ TEST_F(ViewProgramTest, EndsWith130WhereItIsInterrupted) {
   for (const std::string& what :
        {path("many.isohf"), std::string(ISOHF_SOURCE_DIR "/testdata/coast_512x384_int16.tif")}) {
     for (const auto& [signal, action] : kCases) {
+      // Few tiles are verified before the signal comes.
+      if (what != path("many.isohf") && std::string_view(action) == "--verify") continue;
       SCOPED_TRACE(what + " " + action);
       const Outcome stopped =
           test::run_program({"/bin/sh", "-c",

@@ -119,6 +119,9 @@ std::vector<std::pair<std::string, std::vector<const CLI::Option*>>> by_heading(
       groups.push_back({option->get_group(), {option}});
     }
   }
+  // A program of one command has its own options first.
+  if (line.get_parent() == nullptr && line.get_subcommands({}).empty())
+    std::rotate(groups.begin(), groups.begin() + 1, groups.end());
   const auto first = std::ranges::find(groups, kMostUsed, [](const auto& known) { return known.first; });
   if (first != groups.end()) std::rotate(groups.begin(), first, first + 1);
   return groups;

@@ -106,7 +106,7 @@ Report report_of(const ConvertCommandOptions& options, const HeightSource& sourc
   report.add("files", metadata.source.mosaic ? metadata.source.mosaic->files : 1);
   report.add("output", options.output, "archive",
              fmt::format("{}: {}{}", options.output, describe_bytes(summary.archive_bytes),
-                         describe_compression(size, metadata.source.sample_type)));
+                         describe_compression({metadata, summary.archive_bytes}, metadata.source.sample_type)));
   report.add("status", "converted");
   report.add("tiles_expected", summary.tiles_expected);
   std::string tiles = fmt::format("{} x {} of {}x{}", grid.tile_columns(), grid.tile_rows(), grid.shape().columns(),
@@ -299,9 +299,13 @@ Run add_convert(CLI::App& line, Common& common) {
       });
     }
     if (options->output.empty()) {
+      const auto& names = options->inputs.names;
+      const bool comes_first = std::ranges::any_of(names, is_archive_name);
       throw Error(ErrorCode::kInvalidArgument,
-                  fmt::format("no OUTPUT given: {} is an input; name an archive NAME.isohf, or give -o or --out-dir",
-                              options->inputs.names.back()));
+                  comes_first ? "no OUTPUT given: the archive comes last, after all inputs"
+                              : fmt::format("no OUTPUT given: {} is an input; name an archive NAME.isohf last, or give "
+                                            "-o or --out-dir",
+                                            names.back()));
     }
     if (options->shard && !options->convert.z_range && options->convert.code_type != CodeType::kF32) {
       throw Error(ErrorCode::kInvalidArgument,

@@ -258,11 +258,12 @@ int run(const ExportOptions& options) {
   const SampleMapping& mapping = raw->mapping();
   const SampleStore::Result counts = raw->counts();
   const RestoreMethod method = request.method.value_or(usual_method(metadata, samples));
+  const bool is_one = cut.across * cut.down == 1;
   Report report;
   report.add("archive", options.archive);
   report.add(
-      "output", options.output, cut.is_cut ? "tiles" : "raster",
-      fmt::format("{}: {} x {} samples of {}{}", cut.is_cut ? options.output : tiles.written().front(), samples.width,
+      "output", options.output, is_one ? "raster" : "tiles",
+      fmt::format("{}: {} x {} samples of {}{}", is_one ? tiles.written().front() : options.output, samples.width,
                   samples.height, to_string(mapping.type), is_lossless ? ", the source's own, SHA-256 as stated" : ""));
   report.add("source_samples", is_lossless);
   report.add("method", is_lossless ? "source" : to_string(method));

@@ -26,7 +26,7 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kPlanFooter =
-    R"(Takes every option of convert and writes nothing; sizes are estimates. With --shard the whole input is read, and the
+    R"(Takes the options of convert but --max-error, and writes nothing; sizes are estimates. With --shard the whole input is read, and the
 options are printed that the shards need. Without INPUT the candidates for a tile are listed, best true aspect first:
 (R-3)sin60/(C-4), 1 is equilateral.
 

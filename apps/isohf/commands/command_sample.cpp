@@ -54,8 +54,8 @@ Examples:
 struct SampleOptions {
   const Common& common;
   std::string archive{};
-  std::vector<MapPoint> places{};  ///< of --at
-  std::string in = "world";
+  std::vector<MapPoint> places{};   ///< of --at
+  std::string in{};                 ///< empty: world
   std::vector<std::string> with{};  ///< after --with
   bool with_shadow = false;
   SunPlace sun = kUsualSun;
@@ -230,12 +230,28 @@ std::string hint(ArchiveReader& archive, const std::string& name, const Coordina
                                                    : "northing, easting";
     const PairReading as_typed{"", swapped, [&](MapPoint at) { return crs.from_world(in.to_world(at)); }};
     if (const auto other = other_reading_of(archive, asked, as_typed)) {
-      return fmt::format("{}: {:.10g},{:.10g} lies outside; read as {} it lies inside. Check the order, and --in",
-                         archive.path(), typed.easting, typed.northing, other->words);
+      std::string text = fmt::format("{}: {:.10g},{:.10g} lies outside; read as {} it lies inside", archive.path(),
+                                     typed.easting, typed.northing, other->words);
+      const bool is_geo = other->words.find("longitude") != std::string::npos;
+      if (!is_geo && other->words.find("UTM") != std::string::npos) return text;
+      if (other->is_swapped) std::swap(typed.easting, typed.northing);
+      return text + fmt::format(": --at {:.10g},{:.10g} --in {}", typed.easting, typed.northing,
+                                other->index == 0 ? name
+                                : is_geo          ? "lonlat"
+                                                  : "crs");
     }
   } catch (const Error&) {  // it does not say where it lies
   }
   return {};
+}
+
+/// Whether a place that was typed without --in would also be one as longitude and latitude.
+bool may_be_degrees(ArchiveReader& archive, MapPoint typed) {
+  const Metadata& metadata = archive.metadata();
+  if (metadata.horizontal_unit != "metre" || !metadata.source.ground) return false;
+  const GeoExtent& extent = metadata.source.ground->extent;
+  return typed.easting >= extent.west && typed.easting <= extent.east && typed.northing >= extent.south &&
+         typed.northing <= extent.north;
 }
 
 int run(SampleOptions options) {
@@ -243,7 +259,8 @@ int run(SampleOptions options) {
   ArchiveReader archive = open_archive(options.archive);
   print_warnings(common, archive.warnings());
   std::vector<Warning> warnings;
-  const Coordinates in = coordinates_named(options.in, archive, warnings);
+  const std::string name_in = options.in.empty() ? "world" : options.in;
+  const Coordinates in = coordinates_named(name_in, archive, warnings);
   std::vector<NamedCoordinates> with;
   const auto add = [&](const std::string& name) {
     with.emplace_back(name, coordinates_named(name, archive, warnings));
@@ -272,8 +289,10 @@ int run(SampleOptions options) {
     if (options.places.empty()) read_places(common, answers, take);
     answers.flush();
   });
+  if (options.in.empty() && !options.places.empty() && may_be_degrees(archive, options.places.front()) && !common.quiet)
+    print_note(common, "places were read as world units; --in lonlat reads longitude, latitude");
   if (!outside) return kExitDone;
-  if (const std::string text = hint(archive, options.in, in, *outside); !text.empty()) print_warning(common, text);
+  if (const std::string text = hint(archive, name_in, in, *outside); !text.empty()) print_warning(common, text);
   return kExitDone;
 }
 

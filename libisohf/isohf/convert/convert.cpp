@@ -444,9 +444,10 @@ ConvertSummary convert_within(HeightSource& source, const std::string& output, c
       fmt::format("{}: the surface cannot be held to `max_error` {}: the smallest error reached is {:.6g}, with "
                   "{:.3g} vertices a sample and {} bytes; allow that much{}",
                   info.path, most, reached, reached_density, reached_bytes,
-                  chooses_density ? ", or let every sample be a vertex: without `fit`, `wrap_x` and projections other "
-                                    "than equirectangular, and with a step that is fine enough"
-                                  : ", or leave `density`, `spacing` and `tiles` out"));
+                  chooses_density
+                      ? ", or let every sample be a vertex, with a finer `step` or `code_type` f32, and without "
+                        "`fit`, `wrap_x` and projections other than equirectangular"
+                      : ", or leave `density` and `spacing` out"));
 }
 
 /// Windows by which a source's error is estimated: all of a small one. What is unpacked or filled is so by rows: it is

@@ -138,7 +138,7 @@ TEST_F(MosaicCommand, TheArchiveSaysWhatItWasJoinedFrom) {
   EXPECT_EQ(record.at("names")[0], "piece0.tif");
   EXPECT_EQ(record.at("overlap"), "last");
   EXPECT_EQ(joined.at("source").at("name"), "mosaic of 12 files");
-  EXPECT_THAT(run_isohf({"info", folder / "out.isohf"}).out,
+  EXPECT_THAT(run_isohf({"info", folder / "out.isohf", "-v"}).out,
               HasSubstr("joined from  12 files, the last on top: piece0.tif, piece1.tif,"));
   const RunResult verified = run_isohf({"verify", folder / "out.isohf", "--against", folder / "tiles"});
   EXPECT_EQ(verified.exit_code, 0) << verified.out << verified.err;

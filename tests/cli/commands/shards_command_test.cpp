@@ -228,7 +228,7 @@ TEST_F(ShardsCommand, OfAnArchiveACoarsePlaneIsAnArchiveOfItsOwn) {
             0);
   EXPECT_EQ(run({"verify", "corner.isohf"}).exit_code, 0);
   expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--overview", "9"}, 2,
-                 "coarse planes, plane 9 is asked for");
+                 "overviews, not an overview 9");
   expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--overview", "1", "--tiles", "0:1000,0:1"}, 2,
                  "of tiles are asked for, it holds");
   expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--overview", "0"}, 2, "--overview");
