@@ -230,7 +230,7 @@ TEST_F(MosaicCommand, WhatIsNotThereOrTwiceThereIsNamed) {
   // A forgotten output.
   raster.cut(folder / "piece2.tif", {0, 0, 50, 50});
   expect_error({"convert", a, b, folder / "piece2.tif", "--overwrite"}, 2,
-               "piece2.tif is an input; name an archive NAME.isohf, or give -o");
+               "piece2.tif is an input; name an archive NAME.isohf last, or give -o");
   EXPECT_EQ(folder.names(), (Words{"blank.txt", "empty", "list.txt", "piece0.tif", "piece1.tif", "piece2.tif"}));
 }
 
