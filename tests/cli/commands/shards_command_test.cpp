@@ -227,8 +227,7 @@ TEST_F(ShardsCommand, OfAnArchiveACoarsePlaneIsAnArchiveOfItsOwn) {
   EXPECT_EQ(run({"extract", "single.isohf", "-o", "corner.isohf", "--overview", "1", "--tiles", "0:1,0:2"}).exit_code,
             0);
   EXPECT_EQ(run({"verify", "corner.isohf"}).exit_code, 0);
-  expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--overview", "9"}, 2,
-                 "overviews, not an overview 9");
+  expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--overview", "9"}, 2, "overviews, not an overview 9");
   expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--overview", "1", "--tiles", "0:1000,0:1"}, 2,
                  "of tiles are asked for, it holds");
   expect_refused({"extract", "single.isohf", "-o", "a.isohf", "--overview", "0"}, 2, "--overview");
