@@ -28,7 +28,7 @@ PlanRequest tiles(std::int64_t columns, std::int64_t rows) {
   return request;
 }
 
-std::vector<std::string> warnings_of(const SourceInfo& info, const PlanRequest& request) {
+std::vector<Warning> warnings_of(const SourceInfo& info, const PlanRequest& request) {
   return plan_warnings(info, make_plan(info, request), request);
 }
 
@@ -70,7 +70,7 @@ TEST(FittedLattice, AShapeAndTilesThatThinOutTheSourceAreWarnedOfWithTheFigure) 
   request.shape = {{52, 67}};
   const Plan plan = make_plan(posts(1201, 1201), request);
   EXPECT_EQ(plan.grid.shape(), TileShape::make(52, 67, 4)) << "what is asked for is done";
-  const std::vector<std::string> warnings = warnings_of(posts(1201, 1201), request);
+  const std::vector<Warning> warnings = warnings_of(posts(1201, 1201), request);
   ASSERT_EQ(warnings.size(), 1U);
   EXPECT_THAT(warnings[0], testing::HasSubstr("0.00853 vertices for one of the input's samples"));
   EXPECT_THAT(warnings[0], testing::HasSubstr("leave out `shape` or `tiles`"));

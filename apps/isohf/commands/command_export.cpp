@@ -108,9 +108,9 @@ SourceInfo in_words_of(const Metadata& metadata, SourceInfo other) {
 SampleGrid grid_of_other(const ExportOptions& options, const Metadata& metadata) {
   const OpenedInputs like = open_inputs(expand_inputs({options.like}, false), {}, {}, options.work);
   const SourceInfo other = in_words_of(metadata, like.source->info());
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   std::optional<SampleGrid> grid = grid_like(metadata, other, warnings);
-  print_warnings(options.common, {warnings.begin(), warnings.end()});
+  print_warnings(options.common, warnings);
   if (grid) return *grid;
   const SourceFrame frame = make_source_frame(other);
   return {frame.width,

@@ -111,7 +111,7 @@ Report report_of(const SourceInfo& info, const Plan& plan, const MemoryPlan& mem
               {"spacing_x", frame.spacing_x},
               {"spacing_z", frame.spacing_z},
               {"in_metres", frame.in_metres},
-              {"warnings", info.warnings}},
+              {"warnings", json_from(info.warnings)}},
              "input",
              fmt::format("{}: {}, {} x {} {}{}", info.path, info.format, info.width, info.height,
                          to_string(info.sample_type), info.channel.empty() ? "" : ", channel " + info.channel));
@@ -180,7 +180,7 @@ int preview(ConvertCommandOptions& options) {
   ProgressDisplay display(common, options.work.progress);
   const Job job = job_from(options.work, display);
   const MemoryPlan memory = plan_memory(source, plan, how, job);
-  const std::vector<std::string> warnings = plan_warnings(info, plan, how.plan);
+  const std::vector<Warning> warnings = plan_warnings(info, plan, how.plan);
   std::vector<Warning> all = info.warnings;
   all.insert(all.end(), warnings.begin(), warnings.end());
   if (std::string scale = scale_warning(info, plan.frame, how.plan.ground.projection); !scale.empty())
@@ -197,7 +197,7 @@ int preview(ConvertCommandOptions& options) {
   print_warnings(common, all);
   Report report = report_of(info, plan, memory, how, error);
   report.add("memory_bound_bytes", job.bound_bytes());
-  report.add("warnings", warnings);
+  report.add("warnings", json_from(warnings));
   if (options.shard) add_shard_options(source, options, job, report);
   display.clear();
   report.print(common);

@@ -270,7 +270,7 @@ void warn_of_plan(const SourceInfo& info, const Plan& plan, const PlanRequest& r
   if (std::string text = scale_warning(info, plan.frame, request.ground.projection); !text.empty()) {
     warnings.emplace_back(std::move(text));
   }
-  for (std::string& text : plan_warnings(info, plan, request)) warnings.emplace_back(std::move(text));
+  for (Warning& warning : plan_warnings(info, plan, request)) warnings.push_back(std::move(warning));
   if (textures != nullptr) warnings.insert(warnings.end(), textures->warnings().begin(), textures->warnings().end());
 }
 

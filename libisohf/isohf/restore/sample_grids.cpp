@@ -759,8 +759,7 @@ WorldBounds world_bounds(const Metadata& metadata, const MapBounds& asked, Acros
   return bounds;
 }
 
-std::optional<SampleGrid> grid_like(const Metadata& metadata, const SourceInfo& other,
-                                    std::vector<std::string>& warnings) {
+std::optional<SampleGrid> grid_like(const Metadata& metadata, const SourceInfo& other, std::vector<Warning>& warnings) {
   if (is_warped(metadata)) return grid_through_map(metadata, other);
   const SourceRecord& source = metadata.source;
   const Georeference& theirs = other.georeference;

@@ -71,6 +71,6 @@ struct SourceGridRequest {
 /// to begin in the North-West corner. A warning says what was taken for granted.
 /// Throws Error{kInvalidArgument} where the two are known to be in different units, reference systems or bodies.
 [[nodiscard]] std::optional<SampleGrid> grid_like(const Metadata& metadata, const SourceInfo& other,
-                                                  std::vector<std::string>& warnings);
+                                                  std::vector<Warning>& warnings);
 
 }  // namespace isohf

@@ -34,5 +34,15 @@ TEST(PlanCommand, InputGivesTheWholePlanAndWritesNothing) {
   EXPECT_EQ(folder.names(), std::vector<std::string>{"a.tif"});
 }
 
+TEST(PlanCommand, WarningsOfItsDocumentNameOptions) {
+  const TemporaryFolder folder;
+  write_file(folder / "a.asc", "ncols 4\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 30\n1 2 3 4\n5 6 -9999 8\n");
+  const RunResult result = run_isohf({"plan", folder / "a.asc", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json warnings = json::parse(result.out).at("input").at("warnings");
+  ASSERT_EQ(warnings.size(), 1U) << warnings;
+  EXPECT_THAT(warnings.at(0).get<std::string>(), HasSubstr("give --nodata -9999"));
+}
+
 }  // namespace
 }  // namespace isohf::test

@@ -401,7 +401,7 @@ bool can_go_through_samples(const SourceFrame& frame, const PlanRequest& request
   return !frame.warp && !request.fit && (!frame.wraps_x || frame.width % unit == 0);
 }
 
-std::vector<std::string> plan_warnings(const SourceInfo& info, const Plan& plan, const PlanRequest& request) {
+std::vector<Warning> plan_warnings(const SourceInfo& info, const Plan& plan, const PlanRequest& request) {
   const bool is_odd = plan.density < kThinDensity || plan.density > kThickDensity;
   if (request.density || request.spacing || !is_odd) return {};
   return {density_warning(info, plan, request)};

@@ -33,7 +33,6 @@ struct Plan {
 [[nodiscard]] std::vector<TileShape> candidate_shapes(const PlanRequest& request, int limit);
 
 /// What a plan has that nobody asked for: a density below 0.5 or above 2. One line each, with the figure and a remedy.
-[[nodiscard]] std::vector<std::string> plan_warnings(const SourceInfo& info, const Plan& plan,
-                                                     const PlanRequest& request);
+[[nodiscard]] std::vector<Warning> plan_warnings(const SourceInfo& info, const Plan& plan, const PlanRequest& request);
 
 }  // namespace isohf
