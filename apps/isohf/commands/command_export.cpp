@@ -104,9 +104,10 @@ SourceInfo in_words_of(const Metadata& metadata, SourceInfo other) {
   return other;
 }
 
-/// Of the raster in --like.
-SampleGrid grid_of_other(const ExportOptions& options, const Metadata& metadata) {
-  const OpenedInputs like = open_inputs(expand_inputs({options.like}, false), {}, {}, options.work);
+/// Of the raster in --like, which these files make.
+SampleGrid grid_of_other(const ExportOptions& options, const std::vector<std::string>& files,
+                         const Metadata& metadata) {
+  const OpenedInputs like = open_inputs(files, {}, {}, options.work);
   const SourceInfo other = in_words_of(metadata, like.source->info());
   std::vector<Warning> warnings;
   std::optional<SampleGrid> grid = grid_like(metadata, other, warnings);
@@ -126,7 +127,8 @@ struct ExportGrid {
   TileCut cut;
 };
 
-ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
+/// like  the files of --like
+ExportGrid asked_grid(const ExportOptions& options, const std::vector<std::string>& like, ArchiveReader& archive) {
   const Metadata& metadata = archive.metadata();
   ExportGridRequest request = options.grid;
   request.on_own_map = options.system == kOwnMap;
@@ -153,7 +155,7 @@ ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
       throw error.within(options.archive);
     }
   };
-  ExportGrid grid{options.like.empty() ? choose() : grid_of_other(options, metadata), {}};
+  ExportGrid grid{like.empty() ? choose() : grid_of_other(options, like, metadata), {}};
   GridSize size{grid.samples.width, grid.samples.height};
   grid.cut = cut_into_tiles(size, !request.size && !request.spacing, options.tile_size, options.overlap);
   if (size != GridSize{grid.samples.width, grid.samples.height}) {
@@ -169,11 +171,9 @@ ExportGrid asked_grid(const ExportOptions& options, ArchiveReader& archive) {
 }
 
 /// Refuses, before any work, outputs that cannot be written.
-void check_outputs(const ExportOptions& options, const RasterTiles& tiles, const TileCut& cut, SampleType type) {
-  std::vector<std::string> inputs = {options.archive};
-  if (!options.like.empty()) {
-    for (std::string& file : expand_inputs({options.like}, false)) inputs.push_back(std::move(file));
-  }
+void check_outputs(const ExportOptions& options, std::vector<std::string> inputs, const RasterTiles& tiles,
+                   const TileCut& cut, SampleType type) {
+  inputs.push_back(options.archive);
   RasterSpec spec;
   spec.width = cut.columns;
   spec.height = cut.rows;
@@ -207,16 +207,18 @@ int run(const ExportOptions& options) {
   request.is_text = traits.is_text;
   const bool is_lossless = options.is_on_sources_grid() && !options.bbox && !options.surface && request.as_source &&
                            lossless_record(metadata);
+  std::vector<std::string> like;
+  if (!options.like.empty()) like = expand_inputs({options.like}, false);
   ExportGrid grid;
   if (is_lossless) {
     grid.samples = source_grid(metadata.source);
     grid.cut = {1, 1, grid.samples.width, grid.samples.height};
   } else {
-    grid = asked_grid(options, archive);
+    grid = asked_grid(options, like, archive);
   }
   const auto& [samples, cut] = grid;
   RasterTiles tiles(options.output, cut);
-  check_outputs(options, tiles, cut, request.type);
+  check_outputs(options, like, tiles, cut, request.type);
 
   ProgressDisplay display(options.common, options.work.progress);
   const Job job = job_from(options.work, display);

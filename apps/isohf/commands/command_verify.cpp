@@ -94,7 +94,9 @@ struct Accuracy {
   AccuracyReport surface;
 };
 
-Accuracy compare(const VerifyOptions& options, const std::string& path, const Job& job, ProgressDisplay& display) {
+/// Adds to the findings what else the comparison finds.
+Accuracy compare(const VerifyOptions& options, const std::string& path, const Job& job, ProgressDisplay& display,
+                 VerifyReport& checks) {
   ArchiveReader archive = open_archive(path);
   const Metadata& metadata = archive.metadata();
   std::unique_ptr<HeightSource> source;
@@ -109,7 +111,9 @@ Accuracy compare(const VerifyOptions& options, const std::string& path, const Jo
   display.clear();
   print_warnings(options.common, warnings);
   if (is_warped(metadata)) understand_source(archive);
-  return {check_vertices(archive, *source, job), compare_with_source(archive, *source, job)};
+  Accuracy found{check_vertices(archive, *source, job), compare_with_source(archive, *source, job)};
+  add_findings(metadata, found.vertices, found.surface, checks);
+  return found;
 }
 
 /// Why the measured error is more than was allowed; empty if it is not.
@@ -209,10 +213,7 @@ int check(const VerifyOptions& options, const std::string& path, bool is_one_of_
   std::optional<Accuracy> accuracy;
   // An archive that is not whole has no surface to measure.
   const bool is_whole = checks.passed();
-  if (is_whole && !options.against.empty()) {
-    accuracy = compare(options, path, job, *display);
-    add_findings(ArchiveReader(path).metadata(), accuracy->vertices, accuracy->surface, checks);
-  }
+  if (is_whole && !options.against.empty()) accuracy = compare(options, path, job, *display, checks);
   display.reset();
   const std::string too_far = accuracy ? why_too_far(options, accuracy->surface) : "";
   const bool passed = checks.passed() && too_far.empty();
