@@ -11,18 +11,10 @@
 #include "formats/georeference/units.h"
 #include "formats/io/text.h"
 #include "formats/open_options.h"
+#include "isohf/base/number_text.h"
 
 namespace isohf {
 namespace {
-
-/// A whole text as a number, whatever the program's locale; nullopt for anything else.
-std::optional<double> number_from(std::string_view text) {
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
-  double value = 0.0;
-  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || failure != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
 
 /// The value of `name="..."` inside a start tag.
 std::string attribute(std::string_view tag, std::string_view name) {

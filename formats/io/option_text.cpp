@@ -11,23 +11,12 @@
 #include <vector>
 
 #include "formats/io/text.h"
+#include "isohf/base/number_text.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"
 #include "isohf/projection/length_unit.h"
 
 namespace isohf {
-namespace {
-
-/// A number and nothing else, without a locale.
-std::optional<double> number_from(std::string_view text) {
-  double value = 0.0;
-  if (text.starts_with('+')) text.remove_prefix(1);
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool is_number = error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
-  return is_number ? std::optional(value) : std::nullopt;
-}
-
-}  // namespace
 
 std::string system_from(const std::string& text) {
   constexpr std::size_t kMostBytes = 65536;
@@ -81,8 +70,8 @@ std::string with_plain_numbers(const std::string& text) {
   for (std::size_t from = 0; from <= text.size();) {
     const std::size_t to = std::min(text.find_first_of(",:", from), text.size());
     const std::string word = text.substr(from, to - from);
-    const std::optional<double> number = number_from(word);  // nullopt for "nan", or with a unit
-    plain += (number ? fmt::format("{}", *number) : word) + text.substr(to, 1);
+    const std::optional<double> number = number_from(word);  // nullopt with a unit
+    plain += (number && std::isfinite(*number) ? fmt::format("{}", *number) : word) + text.substr(to, 1);
     from = to + 1;
   }
   return plain;

@@ -4,17 +4,13 @@
 
 #include <cmath>
 
+#include "isohf/base/number_text.h"
 #include "isohf/projection/projection_wkt.h"
 
 namespace isohf::cli {
 
 std::string describe_bytes(std::uint64_t bytes) {
-  if (bytes < 1000) return fmt::format("{} bytes", bytes);
-  constexpr const char* kUnits = "kMGTPE";
-  double value = static_cast<double>(bytes) / 1000.0;
-  const char* unit = kUnits;
-  for (; value >= 999.5; ++unit) value /= 1000.0;  // 2^64 bytes are 18 EB
-  return fmt::format("{:.3g} {}B", value, *unit);
+  return in_bytes(static_cast<double>(bytes));
 }
 
 std::string describe_count(std::int64_t count) {

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "isohf/base/number_text.h"
 #include "isohf/error.h"
 
 namespace isohf::cli {
@@ -35,13 +36,6 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-bool read_number(std::string_view text, double& value) {
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
-  if (text.empty() || text.front() == '+') return false;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc{} && end == text.data() + text.size();
-}
-
 double parse_number(const std::string& text) {
   return parse_number_in(text, -std::numeric_limits<double>::max(), std::numeric_limits<double>::max());
 }
@@ -51,8 +45,8 @@ double parse_positive_number(const std::string& text) {
 }
 
 double parse_number_in(const std::string& text, double least, double most) {
-  double value = 0.0;
-  if (read_number(text, value) && value >= least && value <= most) return value;
+  const std::optional<double> value = number_from(text);
+  if (value && *value >= least && *value <= most) return *value;
   const bool has_end = most < std::numeric_limits<double>::max();
   refuse(text, has_end       ? fmt::format("a number from {} to {}", least, most)
                : least > 0.0 ? "a number greater than 0"
@@ -115,26 +109,21 @@ double parse_time(const std::string& text) {
 }
 
 std::pair<double, double> parse_range(const std::string& text) {
-  const std::size_t colon = text.find_first_of(":,");
-  double low = 0.0;
-  double high = 0.0;
-  if (colon == std::string::npos || !read_number(std::string_view(text).substr(0, colon), low) ||
-      !read_number(std::string_view(text).substr(colon + 1), high) || !std::isfinite(low) || !std::isfinite(high)) {
-    refuse(text, "MIN:MAX, two finite numbers");
-  }
-  if (!(low < high)) refuse(text, "MIN:MAX with MIN less than MAX");
-  return {low, high};
+  const std::size_t colon = std::min(text.find_first_of(":,"), text.size());
+  const std::optional<double> low = number_from(text.substr(0, colon));
+  const std::optional<double> high = number_from(std::string_view(text).substr(std::min(colon + 1, text.size())));
+  if (!low || !high || !std::isfinite(*low) || !std::isfinite(*high)) refuse(text, "MIN:MAX, two finite numbers");
+  if (!(*low < *high)) refuse(text, "MIN:MAX with MIN less than MAX");
+  return {*low, *high};
 }
 
 std::vector<double> parse_numbers(const std::string& text) {
   std::vector<double> numbers;
   for (std::size_t start = 0; start <= text.size();) {
     const std::size_t end = std::min(text.find(',', start), text.size());
-    double value = 0.0;
-    if (!read_number(std::string_view(text).substr(start, end - start), value)) {
-      refuse(text, "numbers separated by commas, as in 5,15,30");
-    }
-    numbers.push_back(value);
+    const std::optional<double> value = number_from(std::string_view(text).substr(start, end - start));
+    if (!value) refuse(text, "numbers separated by commas, as in 5,15,30");
+    numbers.push_back(*value);
     start = end + 1;
   }
   return numbers;
@@ -143,8 +132,8 @@ std::vector<double> parse_numbers(const std::string& text) {
 std::uint64_t parse_bytes(const std::string& text) {
   const std::string required = "a size in bytes such as 400M, 1.5GiB or 2GB";
   const std::size_t digits = std::min(text.find_first_not_of("0123456789."), text.size());
-  double value = 0.0;
-  if (digits == 0 || !read_number(std::string_view(text).substr(0, digits), value)) refuse(text, required);
+  const std::optional<double> value = number_from(text.substr(0, digits));
+  if (!value) refuse(text, required);
   std::string unit = text.substr(digits);
   double factor = 1.0;
   if (!unit.empty() && unit != "B") {
@@ -153,7 +142,7 @@ std::uint64_t parse_bytes(const std::string& text) {
     if (power == std::string::npos || !(rest.empty() || rest == "iB" || rest == "B")) refuse(text, required);
     factor = std::pow(rest == "B" ? 1000.0 : 1024.0, static_cast<double>(power) + 1.0);
   }
-  const double bytes = std::floor(value * factor);
+  const double bytes = std::floor(*value * factor);
   if (!(bytes >= 1.0) || bytes > 9e18) refuse(text, required);
   return static_cast<std::uint64_t>(bytes);
 }

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -39,9 +38,6 @@ namespace isohf::cli {
 [[nodiscard]] TileRange parse_tile_range(const std::string& text);
 /// One of `words`; returns its place.
 [[nodiscard]] std::size_t parse_word(const std::string& text, const std::vector<std::string>& words);
-
-/// A number and nothing else, blanks included; false otherwise. Locale-independent. Reads "nan" and "inf".
-[[nodiscard]] bool read_number(std::string_view text, double& value);
 
 /// "; did you mean NEAREST?" of the candidate that was probably meant by `text`: a slip or two of the fingers away, or
 /// begun with it. Empty if there is none.

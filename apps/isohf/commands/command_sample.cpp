@@ -18,6 +18,7 @@
 #include "input/options_source.h"
 #include "isohf/archive.h"
 #include "isohf/base/arena.h"
+#include "isohf/base/number_text.h"
 #include "isohf/error.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
@@ -64,8 +65,8 @@ struct SampleOptions {
   int threads = 0;
 };
 
-/// Reads "x z" or "x,z"; false if the text is neither.
-bool read_place(std::string_view text, MapPoint& place) {
+/// Reads "x z" or "x,z"; nullopt if the text is neither.
+std::optional<MapPoint> read_place(std::string_view text) {
   constexpr std::string_view kBlanks = " \t";
   const auto next_word = [&]() -> std::string_view {
     text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
@@ -74,10 +75,11 @@ bool read_place(std::string_view text, MapPoint& place) {
     text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
     return word;
   };
-  if (!read_number(next_word(), place.easting)) return false;
+  const std::optional<double> x = number_from(next_word());
   if (text.starts_with(',')) text.remove_prefix(1);
-  return read_number(next_word(), place.northing) && text.empty() && std::isfinite(place.easting) &&
-         std::isfinite(place.northing);
+  const std::optional<double> z = number_from(next_word());
+  if (!x || !z || !text.empty() || !std::isfinite(*x) || !std::isfinite(*z)) return std::nullopt;
+  return MapPoint{*x, *z};
 }
 
 /// Coordinates, and what they were called on the command line.
@@ -192,9 +194,8 @@ void read_places(const Common& common, Answers& answers, const std::function<voi
     ++number;
     if (line.ends_with('\r')) line.remove_suffix(1);
     const std::size_t first = line.find_first_not_of(" \t");
-    MapPoint place;
     if (first == std::string_view::npos || line[first] == '#') return;
-    if (read_place(line, place)) return take(place);
+    if (const std::optional<MapPoint> place = read_place(line)) return take(*place);
     answers.flush();
     throw Error(ErrorCode::kCorrupt, fmt::format("standard input, line {}: found '{}', must be 'x z', two numbers",
                                                  number, line.substr(0, 80)));
@@ -304,12 +305,12 @@ Run add_sample(CLI::App& line, Common& common) {
   positional(line, "ARCHIVE", "Archive to sample", options.archive);
   repeated(line, "--at", "X,Z", "Sample this place instead of those on standard input; may be given again",
            [&options](const std::string& text) {
-             MapPoint place;
-             if (!read_place(text, place)) {
+             const std::optional<MapPoint> place = read_place(text);
+             if (!place) {
                throw Error(ErrorCode::kInvalidArgument,
                            "found '" + text + "', must be X,Z, two numbers, as in 500,300");
              }
-             options.places.push_back(place);
+             options.places.push_back(*place);
            });
   option(line, "--in", "world|lonlat|crs|SYSTEM", "Read places in these coordinates [default: world]", options.in);
   repeated(line, "--with", "world|lonlat|crs|SYSTEM", "Print the place too, in these coordinates; may be given again",

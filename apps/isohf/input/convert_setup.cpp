@@ -11,6 +11,7 @@
 #include "formats/georeference/reference_system.h"
 #include "formats/io/file_stamp.h"
 #include "input/options_source.h"
+#include "isohf/base/number_text.h"
 #include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
 #include "isohf/photo/texture_cutter.h"
@@ -57,10 +58,10 @@ ProjectionRequest parse_map(const std::string& text) {
 }
 
 std::optional<double> parse_step(const std::string& text) {
-  double step = 0.0;
   if (text == "auto") return std::nullopt;
   if (text == "finest") return 0.0;
-  if (!read_number(text, step) || !std::isfinite(step) || step <= 0.0)
+  const std::optional<double> step = number_from(text);
+  if (!step || !std::isfinite(*step) || *step <= 0.0)
     refuse("found '" + text + "', must be a number greater than 0, finest or auto");
   return step;
 }

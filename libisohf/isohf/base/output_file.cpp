@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <system_error>
 
-#include "isohf/base/memory/memory_budget.h"
+#include "isohf/base/number_text.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -35,7 +35,6 @@ File open_locked(const std::string& path) {
   throw Error(ErrorCode::kIo, fmt::format("another process is writing {}; wait for it, or choose another name", path));
 }
 
-/// "12.3 MB", powers of 1000.
 [[noreturn]] void refuse_to_replace(const std::string& part) {
   throw Error(ErrorCode::kIo, fmt::format("was made by another program meanwhile; what was to replace it is {}", part));
 }

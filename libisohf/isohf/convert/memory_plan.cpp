@@ -11,6 +11,7 @@
 #include "isohf/archive/planes/plane_builder.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/memory/memory_budget.h"
+#include "isohf/base/number_text.h"
 #include "isohf/convert/stages/residual_stage.h"
 #include "isohf/convert/stages/seed_stage.h"
 #include "isohf/convert/stages/texture_stage.h"

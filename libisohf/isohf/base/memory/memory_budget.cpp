@@ -7,10 +7,10 @@
 #endif
 
 #include <cmath>
-#include <iterator>
 #include <vector>
 
 #include "isohf/base/arena.h"
+#include "isohf/base/number_text.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -23,13 +23,6 @@ void give_back_freed_memory() {
 
 double reading_bytes(const Job& job, double vertices_of_tile) {
   return kProgramBytes + threads_of(job) * (kThreadBytes + kDecodingBytesPerVertex * vertices_of_tile);
-}
-
-std::string in_bytes(double bytes) {
-  constexpr const char* kUnits[] = {"bytes", "kB", "MB", "GB", "TB", "PB", "EB"};
-  std::size_t unit = 0;
-  for (; bytes >= 999.5 && unit + 1 < std::size(kUnits); bytes /= 1000.0) ++unit;
-  return fmt::format("{:.3g} {}", bytes, kUnits[unit]);
 }
 
 void require_memory(const Job& job, double bytes, double least, const std::string& what, const std::string& remedy) {

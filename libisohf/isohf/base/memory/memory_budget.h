@@ -19,9 +19,6 @@ void give_back_freed_memory();
 /// What a program that reads archives takes, whatever it does.
 [[nodiscard]] double reading_bytes(const Job& job, double vertices_of_tile);
 
-/// "80.8 GB", "197 MB".
-[[nodiscard]] std::string in_bytes(double bytes);
-
 /// Throws Error{kOutOfMemory} if the job's bound does not allow `bytes`; `least` is enough. what  does:
 /// "this conversion"   remedy: other than that
 void require_memory(const Job& job, double bytes, double least, const std::string& what, const std::string& remedy);
