@@ -95,7 +95,7 @@ cli::Report report_of(const ViewReport& found, const std::string& archive) {
                         {"worst", one.deviation},
                         {"places", one.count}});
     report.line(finding_name(one.id),
-                fmt::format("{}: tile ({},{}), level {:g}: {}; worst {:g} at {} places", check_name(one.id),
+                fmt::format("{}: tile ({},{}), level {}: {}; worst {:g} at {} places", check_name(one.id),
                             one.tile.column, one.tile.row, one.level, one.where, one.deviation, one.count));
   }
   report.add("findings", findings);

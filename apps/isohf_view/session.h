@@ -33,7 +33,8 @@ class Session {
   void complete_frame();
   /// Changes the far distance by a factor.
   void scale_far(double factor) { far_distance_ = view.far_distance * factor; }
-  /// What a person reads over the frame: kLegend: scale bar, North arrow and colours; kPlace: what a person asks the ground too; kAll: how it is drawn as well
+  /// What a person reads over the frame. kLegend: scale bar, North arrow and colours; kPlace: what a person asks the
+  /// ground too; kAll: how it is drawn as well
   enum class Figures { kNone, kLegend, kPlace, kAll };
   /// middle             of the picture, on the ground: where the scale bar holds; nullopt: there is none
   /// frames_per_second  for kAll

@@ -12,8 +12,8 @@
 namespace isohf::view {
 
 /// An OpenGL 3.3 core context without a window or a display server: on a GPU where EGL lists one (not with
-/// LIBGL_ALWAYS_SOFTWARE=1), else EGL's surfaceless platform, else its default display. Current on the thread that made it
-/// until it goes. One at a time.
+/// LIBGL_ALWAYS_SOFTWARE=1), else EGL's surfaceless platform, else its default display. Current on the thread that made
+/// it until it goes. One at a time.
 class HeadlessContext {
  public:
   /// Throws Error{kUnsupported}, one line, where no such context can be had.
@@ -72,7 +72,8 @@ class Offscreen {
 /// The bound framebuffer's pixels, rows from the top, four channels a pixel.
 [[nodiscard]] std::vector<std::uint8_t> read_pixels(int width, int height);
 
-/// Writes the bound framebuffer as an opaque RGB PNG file, in place of one of that name or not. Throws Error{kIo} naming it.
+/// Writes the bound framebuffer as an opaque RGB PNG file, in place of one of that name or not. Throws Error{kIo}
+/// naming it.
 void write_picture(const std::string& path, int width, int height, bool overwrite);
 
 }  // namespace isohf::view

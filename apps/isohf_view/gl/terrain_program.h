@@ -29,8 +29,8 @@ struct TerrainFrame {
 };
 
 /// A program with the terrain's vertex shader, which every picture and every check draws through, and one fragment
-/// shader or another. Vertex attributes: 0 the shared object-space (x, z); 1 the depth in the shadow (constant 0 without).
-/// Texture units: 0 the tile's texture, 1 the palette, 2 its elevation codes, which TileSlot::bind() binds.
+/// shader or another. Vertex attributes: 0 the shared object-space (x, z); 1 the depth in the shadow (constant 0
+/// without). Texture units: 0 the tile's texture, 1 the palette, 2 its elevation codes, which TileSlot::bind() binds.
 class TerrainProgram {
  public:
   TerrainProgram(const std::string& name, const std::string& fragment_source,

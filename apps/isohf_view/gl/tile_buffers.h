@@ -55,9 +55,10 @@ class SharedGeometry {
   std::vector<std::size_t> side_offsets_bytes_;
 };
 
-/// One tile on the GPU: two bytes a vertex. The vertex shader fetches them from a buffer texture, its own and those of the
-/// neighbours that a normal needs: v-1..v+1, v-C-1..v-C+2 and v+C-1..v+C+2. A row and two vertices of nothing lie before
-/// and behind the codes. Shadows take two more bytes a vertex, as an attribute. A slot is reused for tile after tile.
+/// One tile on the GPU: two bytes a vertex. The vertex shader fetches them from a buffer texture, its own and those of
+/// the neighbours that a normal needs: v-1..v+1, v-C-1..v-C+2 and v+C-1..v+C+2. A row and two vertices of nothing lie
+/// before and behind the codes. Shadows take two more bytes a vertex, as an attribute. A slot is reused for tile after
+/// tile.
 class TileSlot {
  public:
   explicit TileSlot(const SharedGeometry& shared);

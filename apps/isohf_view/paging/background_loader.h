@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
@@ -56,6 +57,16 @@ class Workers {
   std::deque<std::function<void()>> tasks_;
   std::vector<std::jthread> threads_;  // last: they stop first
 };
+
+/// Updates what workers load for until it is complete. In between they have a millisecond, and poll() is called, which
+/// may throw.
+/// update  returns whether nothing is to come
+inline void update_until_complete(const std::function<bool()>& update, const std::function<void()>& poll) {
+  while (!update()) {
+    poll();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
 
 /// Answers requests by workers, which outlive it. Only the thread that owns the loader calls it; no call waits for a
 /// worker, but its end for those that are at work.

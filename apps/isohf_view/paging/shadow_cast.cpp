@@ -12,7 +12,6 @@ namespace isohf::view {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr float kDepthSteps = 32767.0F;
 
 TileRange range_of(const std::vector<TileIndex>& tiles) {
   const auto alone = [](TileIndex tile) { return TileRange{tile, {tile.column + 1, tile.row + 1}}; };
@@ -63,9 +62,7 @@ TileRange casting_range(const TileSource& source, const CastingSun& sun, const T
     if (towards_z > 0.0) range.end.row += z;
     range = intersection(range, {{0, 0}, {grid.tile_columns(), grid.tile_rows()}});
     const bool fits = range.count() <= limits.tiles && range.end.column - range.first.column <= limits.columns;
-    if (fits || reach < 1e-3 * grid.extent_x()) {
-      return range;
-    }
+    if (fits || reach < 1e-3 * grid.extent_x()) return range;
   }
 }
 
@@ -83,7 +80,8 @@ class RangeSweep {
         heights_(box_, std::nullopt),
         hidden_(box_, std::nullopt) {
     const TileGrid& grid = source.grid();
-    // Lines of light lie where a sweep over all tiles would have them, so that shadows go on from one range to the next.
+    // Lines of light lie where a sweep over all tiles would have them, so that shadows go on from one range to the
+    // next.
     sweep_.begin_behind(range.first.column, grid.tile_columns() - range.end.column,
                         sweep_.from_south() ? grid.tile_rows() - range.end.row : range.first.row);
   }

@@ -17,11 +17,14 @@ struct CastingSun {
   friend bool operator==(const CastingSun&, const CastingSun&) = default;
 };
 
+/// Depths in a shadow are counted in such parts of a gain.
+inline constexpr float kDepthSteps = 32767.0F;
+
 /// What a tile is shaded by.
 struct TileShadow {
   TileIndex tile{};
-  /// [C x R] at visible vertices: the part of the sun that is hidden, in 32767ths of `gain`; beyond 0 and 1 how near a
-  /// shadow's border is.
+  /// [C x R] at visible vertices: the part of the sun that is hidden, in kDepthSteps of `gain`; beyond 0 and 1 how near
+  /// a shadow's border is.
   std::vector<std::int16_t> depths;
   float gain = 0.0F;
 };
@@ -33,11 +36,11 @@ struct CastingLimits {
   bool uses_seeds = true;
 };
 
-/// Shadows of tiles of one plane, swept as `isohf shade` sweeps them (decision 48). Besides the tiles asked for, those are
-/// read that may cast shadows on them: as far towards the sun as what is known of the tiles' heights says, within the
-/// limits; of what lies farther nothing is cast. What the source does not cover casts none either. Where light runs along
-/// the rows and the archive's seeds serve it, none but the tiles themselves are read: each is swept by itself, from the
-/// state in which light enters it.
+/// Shadows of tiles of one plane, swept as `isohf shade` sweeps them (decision 48). Besides the tiles asked for, those
+/// are read that may cast shadows on them: as far towards the sun as what is known of the tiles' heights says, within
+/// the limits; of what lies farther nothing is cast. What the source does not cover casts none either. Where light runs
+/// along the rows and the archive's seeds serve it, none but the tiles themselves are read: each is swept by itself,
+/// from the state in which light enters it.
 /// cancelled  ends it early, with what it has
 /// unread     what the first tile said that could not be read; such tiles count as void
 [[nodiscard]] std::vector<TileShadow> cast_shadows(const TileSource& source, const CastingSun& sun,

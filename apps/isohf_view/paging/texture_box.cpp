@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <exception>
-#include <thread>
 
 #include "gl/offscreen.h"
 #include "isohf/error.h"
@@ -203,12 +201,11 @@ void TextureBox::update(const TileRange& range, const ViewState& view, std::uint
 }
 
 void TextureBox::finish(const TileRange& range, const ViewState& view, const std::function<void()>& poll) {
-  for (;;) {
+  const auto is_complete = [&] {
     update(range, view, std::uint64_t{64} << 20U);
-    if (figures_.to_come == 0) return;
-    poll();
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
+    return figures_.to_come == 0;
+  };
+  update_until_complete(is_complete, poll);
 }
 
 GLuint TextureBox::texture(TileIndex tile) const {

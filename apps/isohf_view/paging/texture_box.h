@@ -28,9 +28,9 @@ struct TextureBoxFigures {
 };
 
 /// The textures of the tiles around the camera (docs/decisions/0015), each from the mip level on that its distance asks
-/// for: one whose texels are no larger than pixels. Where memory does not hold what is wanted all tiles get coarser ones.
-/// Workers decode; update() uploads what is ready, a texture a frame or as many as the frame's budget holds, and never
-/// waits. Lives on the GL thread.
+/// for: one whose texels are no larger than pixels. Where memory does not hold what is wanted all tiles get coarser
+/// ones. Workers decode; update() uploads what is ready, a texture a frame or as many as the frame's budget holds, and
+/// never waits. Lives on the GL thread.
 class TextureBox {
  public:
   /// The source has textures. Throws Error{kInvalidArgument} where memory_bytes does not hold a coarsest level on its

@@ -1,9 +1,7 @@
 #include "paging/texture_overview.h"
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
-#include <thread>
 
 #include "paging/texture_box.h"
 
@@ -86,12 +84,11 @@ void TextureOverview::update(std::uint64_t upload_bytes) {
 }
 
 void TextureOverview::finish(const std::function<void()>& poll) {
-  for (;;) {
+  const auto is_complete = [&] {
     update(UINT64_MAX);
-    if (is_whole()) return;
-    poll();
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
+    return is_whole();
+  };
+  update_until_complete(is_complete, poll);
 }
 
 }  // namespace isohf::view

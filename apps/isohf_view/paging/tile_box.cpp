@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <exception>
 #include <iterator>
-#include <thread>
 #include <utility>
 
 #include "isohf/error.h"
@@ -15,8 +13,8 @@
 namespace isohf::view {
 namespace {
 
-/// Bytes of a vertex on the CPU: while its tile is decoded and waits (codes twice over, the inflated payload and room for
-/// zlib), or while light is swept over it (its height and what is hidden).
+/// Bytes of a vertex on the CPU: while its tile is decoded and waits (codes twice over, the inflated payload and room
+/// for zlib), or while light is swept over it (its height and what is hidden).
 constexpr std::uint64_t kAtWork = 8;
 
 std::uint64_t vertices_of(const TileSource& source) {
@@ -242,12 +240,11 @@ void TileBox::count() {
 }
 
 void TileBox::finish(WorldPoint centre, double radius, const std::function<void()>& poll) {
-  for (;;) {
+  const auto is_complete = [&] {
     update(centre, radius, false);
-    if (figures_.missing_tiles == 0 && figures_.shadows_to_come == 0) return;
-    poll();
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
+    return figures_.missing_tiles == 0 && figures_.shadows_to_come == 0;
+  };
+  update_until_complete(is_complete, poll);
 }
 
 const TileSlot* TileBox::resident(TileIndex tile) const {

@@ -34,10 +34,10 @@ struct TileBoxFigures {
   double radius = 0.0;               ///< world units: what was asked for, or less where memory would not do
 };
 
-/// The tiles around the camera, kept resident by sliding a box over the heightfield (paper section 3.12): tiles that leave
-/// it hand their GPU buffers to those that enter. Workers decode; update() uploads what they have finished, within the
-/// frame's budget, and never waits for them. One sweeps light over the tiles whose shadows are not those of the sun, and
-/// those that may cast on them; until then the old ones stay. A TileBox lives on the GL thread.
+/// The tiles around the camera, kept resident by sliding a box over the heightfield (paper section 3.12): tiles that
+/// leave it hand their GPU buffers to those that enter. Workers decode; update() uploads what they have finished,
+/// within the frame's budget, and never waits for them. One sweeps light over the tiles whose shadows are not those of
+/// the sun, and those that may cast on them; until then the old ones stay. A TileBox lives on the GL thread.
 class TileBox {
  public:
   /// Throws Error{kInvalidArgument} where memory_bytes does not hold four tiles.

@@ -59,7 +59,8 @@ struct SourceFacts {
   GroundScale ground_scale{};      ///< from the archive's world to that of all else here
   std::optional<Planes> planes{};  ///< the coarse planes above the tiles
   std::optional<TextureInfo> textures{};
-  /// The least that light along the rows falls in a half step, codes, where shadow seeds serve it; nullopt: there are none.
+  /// The least that light along the rows falls in a half step, codes, where shadow seeds serve it; nullopt: there are
+  /// none.
   std::optional<double> seeded_fall{};
   bool is_to_scale = true;  ///< false where the ground's unit is not known: heights may have any proportion to it
 };

@@ -10,7 +10,6 @@
 namespace isohf::view {
 namespace {
 
-constexpr float kDepthSteps = 32767.0F;
 /// Codes: heights that are floats are rounded where they are drawn.
 constexpr double kRounding = 0.501;
 constexpr double kElevations_deg[] = {3.0, 7.0, 15.0, 35.0};
@@ -34,8 +33,8 @@ class ShadowVerifier {
  private:
   void verify_row(std::int64_t row);
   [[nodiscard]] bool are_heights_drawn(TileIndex tile);
-  void verify_tile(const TileShadow& swept, const RowSun& sun);
-  void check_vertices(const TileShadow& swept, const RowSun& sun);
+  /// swept, drawn  the shadow of a whole row's sweep, and the one that pictures are drawn with
+  void verify_tile(const TileShadow& swept, const TileShadow& drawn, const RowSun& sun);
 
   const CheckContext& context_;
   const TileSource& source_;
@@ -44,7 +43,6 @@ class ShadowVerifier {
   TileSlot slot_;
   std::vector<std::uint16_t> codes_;
   std::vector<float> heights_;  ///< that cast shadows
-  TileShadow drawn_;            ///< what pictures are drawn with
   std::vector<ProbedVertex> captured_;
 };
 
@@ -81,8 +79,7 @@ void ShadowVerifier::verify_row(std::int64_t row) {
       const RowSun sun{travel, elevation_deg};
       for (const TileShadow& swept : cast_shadows(source_, sun.casting(), tiles, whole_row, leaves, unread)) {
         // By itself, as it is drawn.
-        drawn_ = std::move(cast_shadows(source_, sun.casting(), {swept.tile}, {}, leaves, unread).front());
-        verify_tile(swept, sun);
+        verify_tile(swept, cast_shadows(source_, sun.casting(), {swept.tile}, {}, leaves, unread).front(), sun);
       }
     }
   }
@@ -109,19 +106,15 @@ bool ShadowVerifier::are_heights_drawn(TileIndex tile) {
       });
     }
   }
-  worst.report(report_, finding::kDrawnShadow, tile, 0.0);
+  worst.report(report_, finding::kDrawnShadow, tile, 0);
   return !worst.any();
 }
 
-void ShadowVerifier::verify_tile(const TileShadow& swept, const RowSun& sun) {
+void ShadowVerifier::verify_tile(const TileShadow& swept, const TileShadow& drawn, const RowSun& sun) {
   source_.read(swept.tile, codes_);
   slot_.upload(codes_);
-  slot_.upload_shadow(drawn_.depths, drawn_.gain);
+  slot_.upload_shadow(drawn.depths, drawn.gain);
   probe_.capture(slot_, {0, 0}, captured_);
-  check_vertices(swept, sun);
-}
-
-void ShadowVerifier::check_vertices(const TileShadow& swept, const RowSun& sun) {
   const TileShape& shape = source_.grid().shape();
   const bool is_seeded = uses_seeds(source_, sun.casting());
   Worst worst;
@@ -148,7 +141,7 @@ void ShadowVerifier::check_vertices(const TileShadow& swept, const RowSun& sun) 
       });
     }
   }
-  worst.report(report_, finding::kDrawnShadow, swept.tile, 0.0);
+  worst.report(report_, finding::kDrawnShadow, swept.tile, 0);
 }
 
 }  // namespace

@@ -63,7 +63,7 @@ void TileVerifier::verify(TileIndex tile) {
   try {
     source_.read(tile, codes_);
   } catch (const Error& error) {
-    report_.add({finding::kTileUndecodable, tile, 0.0, error.what(), 0.0, 1});
+    report_.add({finding::kTileUndecodable, tile, 0, error.what(), 0.0, 1});
     return;
   }
   slot_.upload(codes_);
@@ -115,7 +115,7 @@ void TileVerifier::check_vertices(TileIndex tile) {
       }
     }
   }
-  worst.report(report_, finding::kDrawnVertex, tile, 0.0);
+  worst.report(report_, finding::kDrawnVertex, tile, 0);
 }
 
 // Every stored vertex near the rim lies in a neighbour's array as well, padding included: the codes must be the same
@@ -164,9 +164,9 @@ void TileVerifier::check_shared(TileIndex tile) {
       if (!there.is_visible && here.is_visible) there = here;
     }
   }
-  codes.report(report_, finding::kSharedVertex, tile, 0.0);
-  places.report(report_, finding::kDrawnCrack, tile, 0.0);
-  if (!codes.any()) normals.report(report_, finding::kNormal, tile, 0.0);  // else these follow from the codes
+  codes.report(report_, finding::kSharedVertex, tile, 0);
+  places.report(report_, finding::kDrawnCrack, tile, 0);
+  if (!codes.any()) normals.report(report_, finding::kNormal, tile, 0);  // else these follow from the codes
 }
 
 void TileVerifier::check_level(TileIndex tile, int level, const PixelWindow& window) {

@@ -52,7 +52,6 @@ std::string check_name(int id) {
       {finding::kTileUndecodable, "readable"}, {finding::kSharedVertex, "shared vertices"},
       {finding::kNormal, "shared vertices"},   {finding::kDrawnVertex, "vertices"},
       {finding::kDrawnCoverage, "coverage"},   {finding::kDrawnHeight, "heights"},
-
       {finding::kDrawnCrack, "cracks"},        {finding::kDrawnMesh, "mesh"},
       {finding::kDrawnShadow, "shadows"}};
   return kNames.at(id);
@@ -110,7 +109,7 @@ void verify_mesh(const SharedGeometry& shared, ViewReport& report) {
       }
     }
     if (open == 0) continue;
-    report.add({finding::kDrawnMesh, {0, 0}, static_cast<double>(level), where, static_cast<double>(open), open});
+    report.add({finding::kDrawnMesh, {0, 0}, level, where, static_cast<double>(open), open});
   }
 }
 

@@ -18,9 +18,9 @@ namespace isohf::view {
 struct ViewFinding {
   int id;  ///< isohf::finding
   TileIndex tile;
-  double level = 0.0;      ///< fractional in transitions
+  int level = 0;
   std::string where;       ///< place, what was found, what was required
-  double deviation = 0.0;  ///< codes, normal components, shares of the sun, or pixels not drawn once
+  double deviation = 0.0;  ///< codes, normal components, parts of the sun, or pixels not drawn once
   std::int64_t count = 1;  ///< places at fault
 };
 
@@ -58,8 +58,8 @@ struct ViewReport {
 /// "shared vertices", ...: what a check looks at, by the id of its findings.
 [[nodiscard]] std::string check_name(int id);
 
-/// Draws every tile at every level, whole and fractional, through the buffers, shaders and index arrays that pictures
-/// are drawn with, and compares what comes back with the library's own arithmetic. A GL context must be current.
+/// Draws every tile at every level through the buffers, shaders and index arrays that pictures are drawn with, and
+/// compares what comes back with the library's own arithmetic. A GL context must be current.
 ///
 /// arrays  what SharedGeometry uploads; make_index_arrays(shape) unless a fault is wanted
 /// The oracles never look at the arrays: level λ is the barycentric surface of a coarse tile. A tile that cannot be
@@ -82,15 +82,16 @@ struct CheckContext {
 /// Reads the index arrays back from the GPU and checks each level's mesh, strip and stitch together: every side that is
 /// not on the tile's border must belong to two triangles that run along it in opposite directions, and what is left
 /// over must be the full-detail border, counter-clockwise, each side once. With that no crack can open between tiles
-/// whose border vertices are drawn in the same places, and no triangle faces down. Findings name tile (0, 0): all tiles share the arrays.
+/// whose border vertices are drawn in the same places, and no triangle faces down. Findings name tile (0, 0): all tiles
+/// share the arrays.
 void verify_mesh(const SharedGeometry& shared, ViewReport& report);
 
 /// The checks that need one tile at a time, and those between a tile and the ones before it.
 void verify_tiles(const CheckContext& context);
 
 /// Checks the shadows that pictures are drawn with: for some suns in the East and West, light is swept over each whole
-/// row of tiles (paper section 3.13), and compared with what the shaders make of each tile's own: from the archive's seeds
-/// where it has them.
+/// row of tiles (paper section 3.13), and compared with what the shaders make of each tile's own: from the archive's
+/// seeds if it has them.
 void verify_shadows(const CheckContext& context);
 
 // Why tolerances are what they are: codes and unit normals pass through 32-bit interpolation, whose planes are told
@@ -111,7 +112,7 @@ class Worst {
   }
   [[nodiscard]] bool any() const { return count_ > 0; }
   /// Reports the worst, if there was any.
-  void report(ViewReport& report, int id, TileIndex tile, double level) const {
+  void report(ViewReport& report, int id, TileIndex tile, int level) const {
     if (any()) report.add({id, tile, level, where_, worst_, count_});
   }
 
