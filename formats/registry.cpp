@@ -209,8 +209,9 @@ void check_numbers(const SourceInfo& info) {
   }
 }
 
-/// What open_raster() hands out: its windows are held against the raster, once for all readers. A raster whose file stays as it is while it is read: of one that another program writes, part would be old and part
-/// new, or not there yet.
+/// What open_raster() hands out: its windows are held against the raster, once for all readers. A raster whose file
+/// stays as it is while it is read: of one that another program writes, part would be old and part new, or not there
+/// yet.
 class UnchangedSource final : public HeightSource {
  public:
   UnchangedSource(std::unique_ptr<HeightSource> source, const FileStamp& stamp, const OpenOptions& options)

@@ -267,7 +267,8 @@ int run(const Program& program, const Arguments& arguments, Common common) {
 int run_main(const Program& program, int argc, char** argv) {
   occupy_standard_descriptors();
   program_name = program.name;
-  // The C library loads what unwinds a stack when it is needed first, and aborts where there is no memory left for that.
+  // The C library loads what unwinds a stack when it is needed first, and aborts where there is no memory left for
+  // that.
   void* frame = nullptr;
   static_cast<void>(::backtrace(&frame, 1));
   // A closed pipe or a file over its size limit is an error that write() reports, not a reason to die at once: what is

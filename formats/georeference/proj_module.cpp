@@ -289,8 +289,8 @@ Object geographic_part(PJ_CONTEXT* context, const PJ* system) {
 
 constexpr int kPlaces = 9;
 
-/// Of kPlaces of a ground (West, South, East, North), how many a way from the longitudes and latitudes of a system has a
-/// place for: grids of shifts end.
+/// Of kPlaces of a ground (West, South, East, North), how many a way from the longitudes and latitudes of a system has
+/// a place for: grids of shifts end.
 int places_shown(PJ_CONTEXT* context, const PJ* way, const IsohfProjSystem& counted, const double* ground) {
   const Object operation(proj_normalize_for_visualization(context, way));
   const double width = ground[2] - ground[0] + (ground[2] < ground[0] ? 360.0 : 0.0);

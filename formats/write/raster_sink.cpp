@@ -174,8 +174,8 @@ std::vector<std::unique_ptr<OutputFile>> begin_sidecars(const std::string& path,
 }
 
 /// Gives the parts of a raster and of what stands beside it their names. All is on the disk before anything gets its
-/// name, and what the raster's name stands for is complete when it appears: whoever ends the program in between finds no
-/// raster, never old samples with a new description.
+/// name, and what the raster's name stands for is complete when it appears: whoever ends the program in between finds
+/// no raster, never old samples with a new description.
 void give_names(const std::string& path, const RasterSpec& spec, const std::function<void()>& name_samples) {
   std::string named = path;
   std::string place;

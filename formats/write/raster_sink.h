@@ -43,7 +43,8 @@ class RasterSink {
   void finish();
   /// Puts all of it on the disk, where finish() finds nothing more to write. Throws as finish() does.
   void close();
-  /// close(), and lets NAME.part go, for name_raster() or drop_raster(): one of many files that get their names together.
+  /// close(), and lets NAME.part go, for name_raster() or drop_raster(): one of many files that get their names
+  /// together.
   void complete();
 
  private:
@@ -80,8 +81,8 @@ void remove_raster(const std::string& path);
 /// Refuses a name that create_raster would refuse, before any work: Error naming the path.
 void check_raster_target(const std::string& path, bool overwrite);
 
-/// Refuses rasters, `count` of them like `path`, that the file system surely has no room for, before any work: Error{kIo}
-/// naming the path. What is compressed may become as small as its compression can make it.
+/// Refuses rasters, `count` of them like `path`, that the file system surely has no room for, before any work:
+/// Error{kIo} naming the path. What is compressed may become as small as its compression can make it.
 void check_raster_room(const std::string& path, const RasterSpec& spec, std::int64_t count = 1);
 
 /// What rasters of a format hold beside samples.
@@ -96,8 +97,8 @@ struct RasterTraits {
 /// Throws Error naming the path if create_raster() knows no such extension.
 [[nodiscard]] RasterTraits raster_traits(const std::string& path);
 
-/// The sample type of a raster of that name: `wanted` if the format holds it, else the nearest that it holds (float32 in
-/// EXR and GridFloat, int16 in HGT, uint16 in PNG and .r16). Throws likewise.
+/// The sample type of a raster of that name: `wanted` if the format holds it, else the nearest that it holds (float32
+/// in EXR and GridFloat, int16 in HGT, uint16 in PNG and .r16). Throws likewise.
 [[nodiscard]] SampleType held_type(const std::string& path, SampleType wanted);
 
 /// Warnings of what `spec` states and the format has no place for, or states otherwise.

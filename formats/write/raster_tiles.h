@@ -25,15 +25,15 @@ struct TileCut {
 };
 
 /// How a raster of `size` samples, columns and rows, is cut. If it is `free`, `size` becomes that of the nearest number
-/// of whole tiles. Throws Error{kInvalidArgument} naming the nearest sizes if tiles do not come out whole, and if overlap
-/// leaves a tile nothing of its own.
+/// of whole tiles. Throws Error{kInvalidArgument} naming the nearest sizes if tiles do not come out whole, and if
+/// overlap leaves a tile nothing of its own.
 /// tile_size  samples of a tile; nullopt: the raster stays whole
 [[nodiscard]] TileCut cut_into_tiles(std::pair<std::int64_t, std::int64_t>& size, bool free,
                                      const std::optional<std::pair<std::int64_t, std::int64_t>>& tile_size,
                                      std::int64_t overlap);
 
-/// The files that a raster is cut into: NAME_x0_y0.r16, the North-West one, and on to the East and South; NAME.r16 if it
-/// is whole.
+/// The files that a raster is cut into: NAME_x0_y0.r16, the North-West one, and on to the East and South; NAME.r16 if
+/// it is whole.
 ///
 /// Rows come from North to South, once for each group of tile columns: at most 64 columns are open at a time. The files
 /// get their names together in finish(); without it nothing has changed.

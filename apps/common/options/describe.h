@@ -23,7 +23,8 @@ namespace isohf::cli {
 /// Lengths on a source's own map for those on the ground.
 [[nodiscard]] std::string describe_map_scale(const MapGround& ground);
 
-/// The map of a result: its projection, else the scale of the source's own, or why that is not known. Empty without one.
+/// The map of a result: its projection, else the scale of the source's own, or why that is not known. Empty without
+/// one.
 [[nodiscard]] std::string describe_map(const std::optional<ProjectionRecord>& projection,
                                        const std::optional<MapGround>& ground, const std::string& why_no_map,
                                        bool wraps_x);

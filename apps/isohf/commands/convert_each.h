@@ -29,7 +29,8 @@ struct EachResult {
 using ConvertOneFile = std::function<std::optional<EachResult>(const EachFile& file, const Batch::Share& share)>;
 
 /// isohf convert INPUT... --out-dir DIR: an archive of each input, with a line for each in the order of the inputs, and
-/// one for all. If the disk is full, no further conversion begins. Returns the worst exit code. Throws Error{kCancelled}.
+/// one for all. If the disk is full, no further conversion begins. Returns the worst exit code. Throws
+/// Error{kCancelled}.
 int convert_each(const ConvertCommandOptions& options, const ConvertOneFile& convert_one);
 
 }  // namespace isohf::cli

@@ -6,8 +6,9 @@
 
 namespace isohf::cli {
 
-/// The part of an archive's world in --bbox, as world_bounds() has it. Throws Error{kInvalidArgument} naming the option,
-/// also if it lies outside of what the archive covers. Has a source that was projected from another map understood.
+/// The part of an archive's world in --bbox, as world_bounds() has it. Throws Error{kInvalidArgument} naming the
+/// option, also if it lies outside of what the archive covers. Has a source that was projected from another map
+/// understood.
 [[nodiscard]] WorldBounds ground_in_box(ArchiveReader& archive, const BoundingBox& box, AcrossEnds across);
 
 }  // namespace isohf::cli

@@ -26,8 +26,8 @@ void require_writable_folder(const std::string& folder);
 /// enough.
 void require_room(const std::string& path, double least_bytes);
 
-/// What a file that exists holds in its first bytes, up to `most_bytes`; nothing where there is no regular file. Throws,
-/// without the path, Error{kIo} where it cannot be read.
+/// What a file that exists holds in its first bytes, up to `most_bytes`; nothing where there is no regular file.
+/// Throws, without the path, Error{kIo} where it cannot be read.
 [[nodiscard]] std::vector<std::byte> head_of_file(const std::string& path, std::size_t most_bytes);
 
 /// The one way in which a file is written: as NAME.part, locked against other writers, which gets the name in one step

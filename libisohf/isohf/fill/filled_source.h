@@ -35,8 +35,8 @@ struct VoidCounts {
 /// or the pieces of a mosaic. It is rounded to the source's sample type, and never to one of its void values. Samples
 /// that are no voids come through bit for bit.
 ///
-/// Memory: the rows of a window and VoidFiller::reach() more on either side, or a scratch file's. Windows without voids are read from the
-/// other source as they are, and looked through once. Works on the caller's oneTBB arena.
+/// Memory: the rows of a window and VoidFiller::reach() more on either side, or a scratch file's. Windows without voids
+/// are read from the other source as they are, and looked through once. Works on the caller's oneTBB arena.
 class FilledSource final : public HeightSource {
  public:
   /// Throws Error{kInvalidArgument} where valid_range leaves nothing or fill_distance is beyond kMaxFillDistance.

@@ -13,7 +13,8 @@ constexpr float kNoCaster = -std::numeric_limits<float>::infinity();
 /// Lanes this near to the end of those that cast shadows count as on it: ends are found by quotients.
 constexpr double kOnEnd = 1e-6;
 
-/// SunEdge in floats. What falls in many steps does in doubles: a line's caster is then the same one, however far it lies.
+/// SunEdge in floats. What falls in many steps does in doubles: a line's caster is then the same one, however far it
+/// lies.
 struct Edge {
   double fall;
   float widening, side, offset, least, steep, most, deepest, low, high;

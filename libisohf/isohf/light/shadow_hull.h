@@ -7,10 +7,10 @@
 #include "isohf/base/view.h"
 #include "isohf/lattice/shadow_path.h"
 
-/// Shadow seeds for every sun elevation at once: the state in which light enters a tile along a row. It comes to the last
-/// vertex before the tile's edge, which the tile stores as padding. What is handed to that vertex, as a function of
-/// t = tan(sun elevation), is max over all earlier vertices of (height - distance * t): an upper envelope of lines, so
-/// the upper convex hull of the points (distance, height). A few casters stand for a whole row.
+/// Shadow seeds for every sun elevation at once: the state in which light enters a tile along a row. It comes to the
+/// last vertex before the tile's edge, which the tile stores as padding. What is handed to that vertex, as a function
+/// of t = tan(sun elevation), is max over all earlier vertices of (height - distance * t): an upper envelope of lines,
+/// so the upper convex hull of the points (distance, height). A few casters stand for a whole row.
 ///
 ///   height      b                 A vertex that is not higher than a later one never matters again; nor does one
 ///     |         .  `-. a          under the line between its neighbours (c). Where only suns above t_min are asked

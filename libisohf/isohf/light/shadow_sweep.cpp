@@ -23,8 +23,8 @@ constexpr std::int64_t kTilesTogether = 8;
 /// Steps behind its caster from which on a penumbra is one step of light wide at least: borders then have no teeth as
 /// large as cells, and the shade that a slope gives itself stays as sharp as it is.
 constexpr double kStepsToFullWidth = 2.0;
-/// Depths are cut off beyond what light falls on so many steps. Less makes teeth of borders on steep ground, whose depth
-/// changes by more from vertex to vertex.
+/// Depths are cut off beyond what light falls on so many steps. Less makes teeth of borders on steep ground, whose
+/// depth changes by more from vertex to vertex.
 constexpr double kDeepestSteps = 4.0;
 
 /// Between two heights; not above the middle, so that it casts no farther than both whatever the rounding.
@@ -309,7 +309,8 @@ ShadowSweep::State ShadowSweep::pass_along_columns(std::int64_t tile_row, const 
         const int lane = from_south_ ? lanes - 1 - row : row;
         float* const out = spread_rows.data() + static_cast<std::size_t>(lane) * across;
         spread(shape, vertices.row(row).data() + column, row % 2 != 0, out);
-        // Light along the rows meets vertices alone: the middle between the last covered one and the next casts nothing.
+        // Light along the rows meets vertices alone: the middle between the last covered one and the next casts
+        // nothing.
         if (travel() && end > 0 && end < half_steps_ && (end % 2 != 0) == (row % 2 != 0)) out[end] = kVoidHeight;
         if (mirrored_) std::reverse(out, out + across);
       }

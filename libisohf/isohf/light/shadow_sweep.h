@@ -55,8 +55,8 @@ struct SweptSun {
 /// Half the angle under which the sun's disc is seen, degrees: from Mars, else from the Earth.
 [[nodiscard]] double sun_radius_deg(const std::string& body);
 
-/// A disc of that radius over heights that are drawn `exaggeration` times as high. Near the horizon the disc is smaller, so
-/// that its lower edge stays above.
+/// A disc of that radius over heights that are drawn `exaggeration` times as high. Near the horizon the disc is
+/// smaller, so that its lower edge stays above.
 /// height_per_world  height units in a world unit
 [[nodiscard]] SweptSun swept_sun(double azimuth_deg, double elevation_deg, double radius_deg, double exaggeration,
                                  double height_per_world);
@@ -71,8 +71,8 @@ class ShadowSweep {
   /// ground  that casts shadows: what the source covered
   ShadowSweep(const TileGrid& grid, const WorldBounds& ground, const SweptSun& sun);
 
-  /// For a grid that is part of another: the tiles of that one to its West and East, and the rows of tiles that light has
-  /// passed over before it. Lines of light then lie where they would lie over all of it.
+  /// For a grid that is part of another: the tiles of that one to its West and East, and the rows of tiles that light
+  /// has passed over before it. Lines of light then lie where they would lie over all of it.
   void begin_behind(std::int64_t tiles_west, std::int64_t tiles_east, std::int64_t rows_before);
 
   /// What is hidden of the sun is cut off so far from 1/2, either way.

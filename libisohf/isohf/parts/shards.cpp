@@ -95,8 +95,8 @@ struct CheckedShard {
   Statistics statistics;
 };
 
-/// Opens and checks files that should be shards of one conversion, all of their bytes. Those that are, by number; what is
-/// wrong with the others goes to `problems`. `metadata` becomes that of one of them. Stage "check".
+/// Opens and checks files that should be shards of one conversion, all of their bytes. Those that are, by number; what
+/// is wrong with the others goes to `problems`. `metadata` becomes that of one of them. Stage "check".
 std::vector<std::optional<CheckedShard>> check_shards(const std::vector<std::string>& files, Problems& problems,
                                                       std::optional<Metadata>& metadata, const Job& job) {
   std::vector<std::optional<Error>> failed(files.size());

@@ -289,8 +289,8 @@ class ImageFinder {
   }
 
  private:
-  /// nullopt where the map does not show the pole as a point. A shift of the datum has the map's own pole lie beside it:
-  /// an arc or a place that is nowhere is known by the circles round the pole, which do not shrink to a point.
+  /// nullopt where the map does not show the pole as a point. A shift of the datum has the map's own pole lie beside
+  /// it: an arc or a place that is nowhere is known by the circles round the pole, which do not shrink to a point.
   [[nodiscard]] std::optional<MapPoint> pole_image(double latitude) const {
     const auto across = [&](double degrees) {
       const double at = std::copysign(90.0 - degrees, latitude);
@@ -468,8 +468,8 @@ MapBounds turned_onto(const SampleGrid& grid, double half, MapBounds bounds) {
   return bounds;
 }
 
-/// The rectangle of a projected source's own coordinates around some ground. Of all that the archive has: the source, or
-/// of an extracted part the rectangle around its tiles.
+/// The rectangle of a projected source's own coordinates around some ground. Of all that the archive has: the source,
+/// or of an extracted part the rectangle around its tiles.
 MapBounds shown_of_source(const Metadata& metadata, const GridSystem& system, const WorldBounds& ground) {
   const Georeference& place = system.place;
   const SourceRecord& source = metadata.source;

@@ -66,9 +66,9 @@ struct SourceGridRequest {
 
 /// The grid of another raster of elevations, in the archive's world or, where the archive's input was projected, in
 /// the system of that. By the origins of both, also where one has no unit that is known and their grounds meet; never
-/// through a projection, where it has to be in the source's system or on the archive's own map. Its longitudes stay as it counts them: RowReader
-/// finds each column by whole turns. nullopt where nothing ties the two, and it is
-/// to begin in the North-West corner. A warning says what was taken for granted.
+/// through a projection, where it has to be in the source's system or on the archive's own map. Its longitudes stay as
+/// it counts them: RowReader finds each column by whole turns. nullopt where nothing ties the two, and it is to begin
+/// in the North-West corner. A warning says what was taken for granted.
 /// Throws Error{kInvalidArgument} where the two are known to be in different units, reference systems or bodies.
 [[nodiscard]] std::optional<SampleGrid> grid_like(const Metadata& metadata, const SourceInfo& other,
                                                   std::vector<Warning>& warnings);

@@ -47,8 +47,8 @@ void shadow_seed_members(JsonMembers& json, ShadowSeedInfo& info);
 /// The tile of such a name; nullopt where it is none in exactly that form.
 [[nodiscard]] std::optional<TileIndex> tile_from_seed_name(std::string_view name);
 
-/// The casters that act on one tile, seen from the edge where their shadows enter: West for light that travels eastwards.
-/// They lie beyond the last vertex before that edge, which the tile stores as padding.
+/// The casters that act on one tile, seen from the edge where their shadows enter: West for light that travels
+/// eastwards. They lie beyond the last vertex before that edge, which the tile stores as padding.
 struct HullSeeds {
   CasterRows eastward;
   CasterRows westward;

@@ -72,8 +72,8 @@ SourceSurvey survey_source(const Conversion& conversion, EdgeRange& edge) {
   return survey;
 }
 
-/// Elevations 0 to 1 in floats are most often a fraction of something, and whole numbers without unit and place that are
-/// beyond any ground codes.
+/// Elevations 0 to 1 in floats are most often a fraction of something, and whole numbers without unit and place that
+/// are beyond any ground codes.
 void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std::vector<Warning>& warnings) {
   constexpr double kHighest = 9000.0;  // metres on the Earth
   if (info.sample_type == SampleType::kUint16 && range.max > kHighest && info.vertical_unit.empty() &&
@@ -175,7 +175,8 @@ void choose_codes(Conversion& conversion, ConvertSummary& summary) {
   const double over = overshoot(conversion.kernel, conversion.prefilter);
   if (over > 0.0 && conversion.options.code_type != CodeType::kF32) {
     // The surface may leave the samples' range. Where the codes reach far enough for the worst case at the same step,
-    // nothing needs to be measured; next to voids and on a raster between whose ends little lies there is no such bound.
+    // nothing needs to be measured; next to voids and on a raster between whose ends little lies there is no such
+    // bound.
     const bool is_large =
         std::min(info.width, info.height) > 2 * (conversion.prefilter.halo() + conversion.kernel.taps());
     const bool has_step =

@@ -59,8 +59,8 @@ class RasterSamples {
 };
 
 /// Samples of the surface on a grid, by the method in the request or usual_method(). Elevations in uint8 and uint16 are
-/// spread over all numbers of the type, unless scale or offset is given, or those of the source are kept: all of them are
-/// then read once more. Stages "range", "export".
+/// spread over all numbers of the type, unless scale or offset is given, or those of the source are kept: all of them
+/// are then read once more. Stages "range", "export".
 [[nodiscard]] std::unique_ptr<RasterSamples> surface_samples(const ArchiveReader& archive, const SampleGrid& grid,
                                                              const RasterRequest& request, const Job& job);
 
