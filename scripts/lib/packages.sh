@@ -2,11 +2,12 @@
 
 # Of the programs without viewer and modules, on whatever machine.
 ISOHF_PACKAGES_LEAN=(
-  zlib1g-dev libdeflate-dev libtiff-dev libpng-dev libjpeg-dev libexpat1-dev libpugixml-dev libwebp-dev
-  libopenexr-dev libtbb-dev libfmt-dev nlohmann-json3-dev libcli11-dev libtomlplusplus-dev libgeographiclib-dev nettle-dev libeigen3-dev)
+  zlib1g-dev libdeflate-dev libtiff-dev libpng-dev libjpeg-dev libexpat1-dev libpugixml-dev libwebp-dev libarchive-dev libgeotiff-dev
+  libopenexr-dev libtbb-dev libfmt-dev nlohmann-json3-dev libcli11-dev libtomlplusplus-dev libgeographiclib-dev
+  libproj-dev libnetcdf-dev nettle-dev libeigen3-dev)
 ISOHF_PACKAGES_BUILD=(
   g++ cmake ninja-build pkg-config git ca-certificates
-  "${ISOHF_PACKAGES_LEAN[@]}" libopenimageio-dev libproj-dev libnetcdf-dev
+  "${ISOHF_PACKAGES_LEAN[@]}" libopenimageio-dev
   libepoxy-dev libglfw3-dev libegl-dev libgl-dev libegl1 libgl1-mesa-dri
   libgtest-dev libgmock-dev libbenchmark-dev
   unzip zip xvfb xauth xdotool python3-jsonschema)
