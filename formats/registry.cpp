@@ -12,7 +12,7 @@
 #include <limits>
 #include <span>
 
-#include "formats/georeference/reference_system.h"
+#include "formats/georeference/complete_system.h"
 #include "formats/io/file_stamp.h"
 #include "formats/io/foreign_file.h"
 #include "formats/io/raw_file.h"
@@ -23,6 +23,8 @@
 #include "isohf/base/handed_in.h"
 #include "isohf/base/void_values.h"
 #include "isohf/error.h"
+#include "isohf/projection/crs.h"
+#include "isohf/projection/source_system.h"
 #include "isohf/raster.h"
 
 namespace isohf {
@@ -215,7 +217,7 @@ void check_numbers(const SourceInfo& info) {
 class UnchangedSource final : public HeightSource {
  public:
   UnchangedSource(std::unique_ptr<HeightSource> source, const FileStamp& stamp, const OpenOptions& options)
-      : source_(std::move(source)), info_(source_->info()), stamp_(stamp) {
+      : source_(std::move(source)), info_(source_->info()), stamp_(stamp), limit_(options.buffer_bytes) {
     warn_of_feet(options);
     warn_of_latitudes();
     take_heights_of_code();
@@ -228,8 +230,10 @@ class UnchangedSource final : public HeightSource {
     require_unchanged(info_.path, stamp_);
     check_elevations(samples);
   }
-  void limit_buffers(std::uint64_t bytes) override { source_->limit_buffers(bytes); }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return source_->buffer_bytes(limit); }
+  [[nodiscard]] std::uint64_t buffer_bytes() const override {
+    const std::uint64_t bytes = source_->buffer_bytes(limit_);
+    return bytes != 0 ? bytes : source_->buffer_bytes();
+  }
 
  private:
   /// Heights beside coordinates in feet may be either, and nothing of the surface tells which.
@@ -299,6 +303,7 @@ class UnchangedSource final : public HeightSource {
   std::unique_ptr<HeightSource> source_;
   SourceInfo info_;  ///< its path is that of the samples, where a header was named
   FileStamp stamp_;
+  std::uint64_t limit_;
 };
 
 /// A raster whose system the user completes.
@@ -327,8 +332,7 @@ class PlacedSource final : public HeightSource {
   void read_window(const Window& window, std::span<std::byte> samples) override {
     source_->read_window(window, samples);
   }
-  void limit_buffers(std::uint64_t bytes) override { source_->limit_buffers(bytes); }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return source_->buffer_bytes(limit); }
+  [[nodiscard]] std::uint64_t buffer_bytes() const override { return source_->buffer_bytes(); }
 
  private:
   /// Samples stay as they are: a system with heights in another unit would make hills of mountains.
@@ -373,6 +377,7 @@ std::unique_ptr<HeightSource> open_raster(const std::string& path, const OpenOpt
   try {
     const FileStamp named = FileStamp::of(path);
     std::unique_ptr<HeightSource> source = open_by_head(path, options);
+    source->limit_buffers(options.buffer_bytes);
     // A header that was named is read for good by now.
     const std::string& samples = source->info().path;
     const FileStamp stamp = samples == path ? named : FileStamp::of(samples);

@@ -11,9 +11,10 @@
 #include <vector>
 
 #include "formats/adapters/windowed_source.h"
-#include "formats/georeference/reference_system.h"
 #include "isohf/error.h"
+#include "isohf/projection/crs.h"
 #include "isohf/projection/other_reading.h"
+#include "isohf/projection/source_system.h"
 
 namespace isohf {
 namespace {
@@ -197,11 +198,10 @@ class JoinedSource final : public HeightSource {
   }
 
   // Both ends of a row of blocks are needed at once.
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t /*limit*/) const override {
-    return source_.buffer_bytes(UINT64_MAX) +
-           static_cast<std::uint64_t>(info_.width) *
-               static_cast<std::uint64_t>(std::max<std::int64_t>(info_.block_height, 1)) *
-               size_bytes(info_.sample_type);
+  [[nodiscard]] std::uint64_t buffer_bytes() const override {
+    return source_.buffer_bytes() + static_cast<std::uint64_t>(info_.width) *
+                                        static_cast<std::uint64_t>(std::max<std::int64_t>(info_.block_height, 1)) *
+                                        size_bytes(info_.sample_type);
   }
   [[nodiscard]] HeightSource& as_stored() override { return stored_ ? *stored_ : *this; }
 

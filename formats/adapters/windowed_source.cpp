@@ -17,10 +17,6 @@ namespace isohf {
 namespace {
 
 /// `block`: samples along one axis; 0 or 1 where there are no blocks.
-bool begins_a_block(std::int64_t at, std::int64_t block) {
-  return at == 0 || block <= 1 || at % block == 0;
-}
-
 Window all_but_the_last_column(const SourceInfo& info) {
   return {0, 0, info.width - 1, info.height};
 }
@@ -43,11 +39,7 @@ std::optional<std::int64_t> row_that_differs(HeightSource& source) {
 }  // namespace
 
 WindowedSource::WindowedSource(HeightSource& source, const Window& window)
-    : source_(source),
-      window_(window),
-      info_(source.info()),
-      keeps_blocks_(begins_a_block(window.column, info_.block_width) &&
-                    begins_a_block(window.row, info_.block_height)) {
+    : source_(source), window_(window), info_(source.info()) {
   ISOHF_ASSERT(window.column >= 0 && window.columns >= 1 && window.column + window.columns <= info_.width);
   ISOHF_ASSERT(window.row >= 0 && window.rows >= 1 && window.row + window.rows <= info_.height);
   info_.width = window.columns;
@@ -71,15 +63,6 @@ void WindowedSource::read_window(const Window& window, std::span<std::byte> samp
   ISOHF_ASSERT(window.column >= 0 && window.row >= 0);
   ISOHF_ASSERT(window.column + window.columns <= info_.width && window.row + window.rows <= info_.height);
   source_.read_window({window_.column + window.column, window_.row + window.row, window.columns, window.rows}, samples);
-}
-
-// Whole blocks of the window are halves of the source's, unless it begins where one does: each would be decoded twice.
-void WindowedSource::limit_buffers(std::uint64_t bytes) {
-  if (keeps_blocks_) source_.limit_buffers(bytes);
-}
-
-std::uint64_t WindowedSource::buffer_bytes(std::uint64_t limit) const {
-  return source_.buffer_bytes(keeps_blocks_ ? limit : UINT64_MAX);
 }
 
 ClosedSource::ClosedSource(std::unique_ptr<HeightSource> source)

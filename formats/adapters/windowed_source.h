@@ -17,8 +17,7 @@ class WindowedSource : public HeightSource {
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
   void read_window(const Window& window, std::span<std::byte> samples) override;
-  void limit_buffers(std::uint64_t bytes) override;
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override;
+  [[nodiscard]] std::uint64_t buffer_bytes() const override { return source_.buffer_bytes(); }
   /// The same window of what the other source is made of.
   [[nodiscard]] HeightSource& as_stored() override { return stored_ ? *stored_ : *this; }
 
@@ -32,7 +31,6 @@ class WindowedSource : public HeightSource {
   HeightSource& source_;
   Window window_;
   SourceInfo info_;
-  bool keeps_blocks_;                       ///< windows that begin where blocks do, still do
   std::unique_ptr<WindowedSource> stored_;  ///< null: source_ is as stored
 };
 

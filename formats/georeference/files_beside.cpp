@@ -19,12 +19,12 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/georeference/reference_system.h"
 #include "formats/georeference/wkt.h"
 #include "formats/geotiff/gdal_tags.h"
 #include "formats/io/raw_file.h"
 #include "formats/io/text.h"
 #include "isohf/error.h"
+#include "isohf/projection/source_system.h"
 
 namespace isohf {
 namespace {
@@ -177,13 +177,10 @@ void place_by_transform(const std::string& path, const std::string& text, Georef
 
 void read_system_text(const std::string& text, const std::string& path, SourceInfo& info) {
   try {
-    if (read_wkt(text, info)) return;
-  } catch (const Error& error) {
-    throw error.within(path);
-  }
-  try {
     take_system(text, info);
-  } catch (const Error& error) {  // the samples are what they are: a local grid, what no PROJ is there to read
+  } catch (const Error& error) {
+    // One that says how its coordinates are counted, but otherwise than ours, cannot be left out.
+    if (error.code() == ErrorCode::kUnsupported) throw error.within(path);
     info.warnings.push_back(loss(fmt::format("{}: {}: the reference system is left out", path, error.what())));
   }
 }
@@ -324,11 +321,14 @@ bool take_prj(SourceInfo& info) {
   const std::string text = prj_beside(info.path);
   if (text.empty()) return false;
   try {
-    if (read_prj(text, info)) return true;
+    take_system(text, info);
+    return true;
   } catch (const Error& error) {
-    throw error.within(info.path);
+    if (error.code() == ErrorCode::kUnsupported) throw error.within(info.path);
   }
-  info.warnings.push_back(loss("the .prj beside the file is not the WKT of a map's reference system; it is ignored"));
+  info.warnings.push_back(loss(
+      "the .prj beside the file is of no reference system that PROJ understands; it is ignored (`reference_system` "
+      "EPSG:n names it)"));
   return false;
 }
 

@@ -46,7 +46,7 @@ void read_auxiliary_metadata(SourceInfo& info, int band);
 /// Gives `bands` bands the names that the same file has for those without one.
 void name_bands_beside(const std::string& raster_path, std::size_t bands, std::vector<std::string>& names);
 
-/// Reads the .prj beside info.path, where there is one, with read_wkt. One that is no WKT becomes a warning, and so do
+/// Reads the .prj beside info.path, where there is one. One that PROJ does not understand becomes a warning, and so do
 /// coordinates that look like degrees without one.
 void read_prj_beside(SourceInfo& info);
 
@@ -60,8 +60,9 @@ void place_by(const WorldFile& world, std::int64_t rows, Georeference& place);
 /// `path`: kCorrupt, kUnsupported for a raster that is turned or has South on top.
 void place_by_transform(const std::string& path, const std::string& text, Georeference& place);
 
-/// Takes a reference system that `path` gives as WKT, or as a code or PROJ string, which need PROJ. One that is none of a
-/// map, or that nothing here understands, is left out with a warning. Throws Error naming `path` for WKT that is refused.
+/// Takes a reference system that `path` gives: WKT, a code, PROJJSON or a PROJ string. One that is none of a map or of
+/// degrees, or that PROJ does not understand, is left out with a warning. Throws Error{kUnsupported} naming `path` for
+/// one whose coordinates are counted in a way that isohf does not read.
 void read_system_text(const std::string& text, const std::string& path, SourceInfo& info);
 
 /// Whether the file has said what its coordinates are: a header may know metres without a name for their map.

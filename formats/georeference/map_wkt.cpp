@@ -8,8 +8,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "formats/georeference/units.h"
 #include "formats/io/text.h"
+#include "isohf/projection/length_unit.h"
 
 namespace isohf {
 namespace {

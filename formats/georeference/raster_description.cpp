@@ -7,12 +7,12 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "formats/georeference/units.h"
-#include "formats/georeference/wkt.h"
 #include "formats/io/raw_file.h"
 #include "formats/io/text.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"
+#include "isohf/projection/length_unit.h"
+#include "isohf/projection/source_system.h"
 #include "isohf/raster.h"
 
 namespace isohf {
@@ -82,8 +82,13 @@ void RasterDescription::describe(SourceInfo& info) const {
   if (word("vertical_unit") != "unknown") info.vertical_unit = word("vertical_unit");
   if (const auto unit = linear_unit(info.vertical_unit)) info.metres_per_vertical_unit = unit->metres;
   describe_place(info.georeference);
-  const std::string wkt = word("crs_wkt");
-  if (!wkt.empty() && !read_wkt(wkt, info)) refuse("crs_wkt is no WKT of a map's reference system");
+  if (const std::string wkt = word("crs_wkt"); !wkt.empty()) {
+    try {
+      take_system(wkt, info);
+    } catch (const Error& error) {
+      refuse(fmt::format("crs_wkt: {}", error.what()));
+    }
+  }
   ReferenceSystem& system = info.georeference.system;
   if (const std::string datum = word("vertical_datum"); !datum.empty()) system.vertical_datum = datum;
   if (const auto heights = code("vertical_epsg")) system.vertical_epsg = heights;

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "formats/georeference/reference_system.h"
 #include "isohf/error.h"
+#include "isohf/projection/crs.h"
 #include "isohf/surface.h"
 
 namespace isohf {

@@ -9,12 +9,6 @@
 
 namespace isohf {
 
-/// Reads what isohf uses of a reference system written as WKT (OGC 01-009, ESRI's dialect of it, ISO 19162): name, EPSG
-/// code, horizontal unit, ellipsoid, body, and the text itself, into info.georeference, and of its heights name, code and
-/// unit. False, and nothing changed, where the text is not the WKT of a projected or geographic system.
-/// Throws Error{kUnsupported} where its longitudes and latitudes are no degrees from Greenwich.
-[[nodiscard]] bool read_wkt(std::string_view text, SourceInfo& info);
-
 /// What a system is called that its longitudes and latitudes are on; empty where a WKT does not say it.
 struct DatumNames {
   std::string geographic;
@@ -34,9 +28,5 @@ struct KeyedMap {
 };
 /// nullopt where a WKT does not say, by the code of its method, that it is one.
 [[nodiscard]] std::optional<KeyedMap> keyed_map(std::string_view wkt);
-
-/// What read_wkt() does of a .prj, which may be older than WKT: lines of keywords ("Projection UTM"), as Arc/Info wrote them. Those
-/// other than GEOGRAPHIC need PROJ. Throws also what take_system() throws.
-[[nodiscard]] bool read_prj(std::string_view text, SourceInfo& info);
 
 }  // namespace isohf

@@ -8,10 +8,10 @@
 #include <string_view>
 #include <system_error>
 
-#include "formats/georeference/units.h"
 #include "formats/io/text.h"
 #include "formats/open_options.h"
 #include "isohf/base/number_text.h"
+#include "isohf/projection/length_unit.h"
 
 namespace isohf {
 namespace {

@@ -11,11 +11,13 @@
 #include <utility>
 
 #include "formats/georeference/map_wkt.h"
-#include "formats/georeference/reference_system.h"
-#include "formats/georeference/units.h"
 #include "formats/georeference/wkt.h"
 #include "formats/io/text.h"
 #include "isohf/error.h"
+#include "isohf/projection/body.h"
+#include "isohf/projection/crs.h"
+#include "isohf/projection/length_unit.h"
+#include "isohf/projection/source_system.h"
 
 namespace isohf {
 namespace {
@@ -277,6 +279,17 @@ void read_ellipsoid(Keys& keys, ReferenceSystem& system) {
   }
 }
 
+/// False where PROJ does not understand the text.
+bool read_wkt(const std::string& wkt, SourceInfo& info) {
+  try {
+    take_system(wkt, info);
+    return true;
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kUnsupported) throw;
+    return false;
+  }
+}
+
 constexpr std::string_view kEsri = "ESRI PE String = ";
 
 /// The WKT in one of the citations, as ArcGIS writes it; empty where none has any.
@@ -324,7 +337,7 @@ void assume_unit(const std::string& wkt, GeoTiffPlace& place) {
   // These are in metres, and in nearly every file.
   if (!geo.system.epsg || ellipsoid_of_crs(*geo.system.epsg)) return;
   try {
-    const auto system = understand_system(system_text(geo.system));
+    const auto system = Crs::parse(system_text(geo.system));
     if (system->description().is_projected) geo.metres_per_unit = system->description().unit;
   } catch (const Error& error) {
     place.warnings.push_back(fmt::format(

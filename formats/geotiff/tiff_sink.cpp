@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-#include "formats/georeference/units.h"
+#include "formats/georeference/gdal_unit.h"
 #include "formats/geotiff/gdal_tags.h"
 #include "formats/geotiff/geotiff_keys.h"
 #include "formats/write/encoders.h"

@@ -19,7 +19,6 @@
 
 #include "formats/adapters/masked_source.h"
 #include "formats/georeference/files_beside.h"
-#include "formats/georeference/units.h"
 #include "formats/geotiff/gdal_tags.h"
 #include "formats/geotiff/geotiff_keys.h"
 #include "formats/geotiff/tiff_blocks.h"

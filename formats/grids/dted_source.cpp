@@ -1,4 +1,5 @@
 #include "formats/readers.h"
+#include "isohf/projection/source_system.h"
 
 #include <fmt/format.h>
 
@@ -12,7 +13,6 @@
 #include <vector>
 
 #include "formats/georeference/files_beside.h"
-#include "formats/georeference/units.h"
 #include "formats/io/bands.h"
 #include "formats/io/file_source.h"
 #include "formats/io/text.h"

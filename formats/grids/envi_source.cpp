@@ -10,12 +10,13 @@
 #include <vector>
 
 #include "formats/georeference/files_beside.h"
-#include "formats/georeference/units.h"
 #include "formats/grids/described_source.h"
 #include "formats/io/bands.h"
 #include "formats/io/text.h"
 #include "formats/readers.h"
 #include "isohf/error.h"
+#include "isohf/projection/length_unit.h"
+#include "isohf/projection/source_system.h"
 #include "isohf/raster.h"
 
 namespace isohf {
@@ -150,7 +151,9 @@ class EnviSource final : public DescribedSource {
       place.unit = HorizontalUnit::kMetre;
       const double zone = number(parts[7], "map info");
       if (is_wgs84 && zone >= 1.0 && zone <= 60.0) {
-        place.system = wgs84_utm_zone(static_cast<int>(zone), lower_case(parts[8]) == "south");
+        read_system_text(
+            fmt::format("EPSG:{}", (lower_case(parts[8]) == "south" ? 32700 : 32600) + static_cast<int>(zone)), header_,
+            info_);
       } else if (degrees != 0 && zone >= 1.0 && zone <= 22.0 && lower_case(parts[8]) == "north") {
         read_system_text(fmt::format("EPSG:{}", (degrees == 4267 ? 26700 : 26900) + static_cast<int>(zone)), header_,
                          info_);

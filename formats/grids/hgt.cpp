@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "formats/georeference/files_beside.h"
-#include "formats/georeference/units.h"
 #include "formats/grids/plain_samples.h"
 #include "formats/io/bands.h"
 #include "formats/io/text.h"
@@ -18,6 +17,7 @@
 #include "formats/write/encoders.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
+#include "isohf/projection/source_system.h"
 #include "isohf/raster.h"
 
 namespace isohf {

@@ -1,4 +1,7 @@
 #include "formats/mosaic/mosaic_layout.h"
+#include "isohf/projection/crs.h"
+#include "isohf/projection/crs_operation.h"
+#include "isohf/projection/source_system.h"
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
@@ -13,7 +16,6 @@
 #include <tuple>
 #include <utility>
 
-#include "formats/georeference/reference_system.h"
 #include "formats/mosaic/reader_pool.h"
 #include "isohf/error.h"
 #include "isohf/projection/choose_projection.h"

@@ -12,10 +12,11 @@
 #include <tuple>
 
 #include "formats/georeference/files_beside.h"
-#include "formats/georeference/units.h"
 #include "formats/io/text.h"
 #include "formats/open_options.h"
 #include "isohf/error.h"
+#include "isohf/projection/length_unit.h"
+#include "isohf/projection/source_system.h"
 
 namespace isohf {
 namespace {

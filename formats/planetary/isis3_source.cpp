@@ -1,4 +1,6 @@
 #include "formats/readers.h"
+#include "isohf/projection/body.h"
+#include "isohf/projection/length_unit.h"
 
 #include <fmt/format.h>
 
@@ -13,7 +15,6 @@
 
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/map_wkt.h"
-#include "formats/georeference/units.h"
 #include "formats/io/bands.h"
 #include "formats/io/file_source.h"
 #include "formats/open_options.h"

@@ -1,4 +1,6 @@
 #include "formats/readers.h"
+#include "isohf/projection/body.h"
+#include "isohf/projection/length_unit.h"
 
 #include <fmt/format.h>
 
@@ -19,7 +21,6 @@
 
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/map_wkt.h"
-#include "formats/georeference/units.h"
 #include "formats/grids/plain_samples.h"
 #include "formats/io/bands.h"
 #include "formats/io/text.h"

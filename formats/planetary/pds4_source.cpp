@@ -16,14 +16,15 @@
 
 #include "formats/georeference/files_beside.h"
 #include "formats/georeference/map_wkt.h"
-#include "formats/georeference/reference_system.h"
-#include "formats/georeference/units.h"
 #include "formats/grids/described_source.h"
 #include "formats/io/bands.h"
 #include "formats/io/text.h"
 #include "formats/io/text_tokens.h"
 #include "formats/readers.h"
 #include "isohf/error.h"
+#include "isohf/projection/body.h"
+#include "isohf/projection/crs.h"
+#include "isohf/projection/length_unit.h"
 #include "isohf/projection/reference_map.h"
 #include "isohf/raster.h"
 

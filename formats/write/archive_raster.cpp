@@ -1,6 +1,6 @@
 #include "formats/write/archive_raster.h"
+#include "isohf/projection/length_unit.h"
 
-#include "formats/georeference/units.h"
 
 namespace isohf {
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "formats/georeference/reference_system.h"
 #include "formats/write/encoders.h"
 #include "formats/write/raster_sink.h"
+#include "isohf/projection/source_system.h"
 
 namespace isohf {
 

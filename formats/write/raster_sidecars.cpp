@@ -1,4 +1,6 @@
+#include "formats/georeference/gdal_unit.h"
 #include "formats/write/encoders.h"
+#include "isohf/projection/crs.h"
 
 #include <fmt/format.h>
 
@@ -10,8 +12,6 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/georeference/files_beside.h"
-#include "formats/georeference/reference_system.h"
-#include "formats/georeference/units.h"
 #include "formats/io/text.h"
 #include "isohf/base/output_file.h"
 #include "isohf/error.h"

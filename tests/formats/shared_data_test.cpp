@@ -238,7 +238,7 @@ void expect_kind(HeightSource& source, const std::filesystem::path& file, const 
   const bool is_grid = ending == ".flt" || ending == ".bil";
   const bool has_prj = std::filesystem::exists(std::filesystem::path(file).replace_extension(".prj"));
   if (is_grid) {
-    EXPECT_EQ(place.system.wkt.empty(), !has_prj);
+    EXPECT_EQ(place.system.wkt.empty() && !place.system.epsg, !has_prj);
     // The header stands for the grid as well.
     const auto by_header = open_raster(std::filesystem::path(file).replace_extension(".hdr").string(), {});
     EXPECT_EQ(read_whole(*by_header), read_whole(source));

@@ -1,4 +1,4 @@
-// Any text is a reference system as WKT or a .prj, or an .aux.xml, or one line that says why it is none.
+// Any text is a reference system, or an .aux.xml, or one line that says why it is none.
 
 #include <cstddef>
 #include <cstdint>
@@ -6,23 +6,19 @@
 #include <string>
 
 #include "formats/georeference/files_beside.h"
-#include "formats/georeference/reference_system.h"
-#include "formats/georeference/wkt.h"
 #include "isohf/error.h"
+#include "isohf/projection/crs.h"
+#include "isohf/projection/source_system.h"
 #include "support/temporary_folder.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
-  for (const auto read : {isohf::read_wkt, isohf::read_prj}) {
+  try {
     isohf::SourceInfo info;
-    try {
-      if (!read(text, info)) continue;
-      const isohf::ReferenceSystem& system = info.georeference.system;
-      static_cast<void>(isohf::system_text(system));
-      static_cast<void>(isohf::wkt_of(system, isohf::WktDialect::kGdal));
-    } catch (const isohf::Error& error) {
-      if (std::string(error.what()).find_first_of("\n\r") != std::string::npos) std::abort();
-    }
+    isohf::take_system(text, info);
+    static_cast<void>(isohf::wkt_of(info.georeference.system, isohf::WktDialect::kGdal));
+  } catch (const isohf::Error& error) {
+    if (std::string(error.what()).find_first_of("\n\r") != std::string::npos) std::abort();
   }
   static const isohf::test::TemporaryFolder folder("/dev/shm");
   isohf::SourceInfo info;

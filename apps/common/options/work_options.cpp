@@ -37,6 +37,11 @@ std::uint64_t WorkOptions::unpacked_bytes(std::uint64_t wanted) const {
   return bound == 0 ? wanted : std::min(wanted, bound / 3);
 }
 
+std::uint64_t WorkOptions::reader_bytes(std::uint64_t wanted) const {
+  const std::uint64_t bound = job_from(*this).bound_bytes();
+  return bound == 0 ? wanted : std::min(wanted, bound / 8);
+}
+
 std::string scratch_folder_for(const std::string& output) {
   const char* const folder = std::getenv("TMPDIR");
   return folder != nullptr && *folder != '\0' ? folder : folder_of(output);

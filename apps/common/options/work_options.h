@@ -18,6 +18,8 @@ struct WorkOptions {
 
   /// The most that is held of packed contents.
   [[nodiscard]] std::uint64_t unpacked_bytes(std::uint64_t wanted) const;
+  /// What a reader may keep of decoded samples (OpenOptions::buffer_bytes): an eighth of the memory, `wanted` at most.
+  [[nodiscard]] std::uint64_t reader_bytes(std::uint64_t wanted) const;
 };
 
 /// -j alone.

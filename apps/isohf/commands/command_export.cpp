@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "commands/command.h"
-#include "formats/georeference/reference_system.h"
 #include "formats/write/archive_raster.h"
 #include "formats/write/raster_tiles.h"
 #include "input/box_ground.h"
@@ -16,6 +15,7 @@
 #include "isohf/base/arena.h"
 #include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
+#include "isohf/projection/crs.h"
 #include "isohf/restore/raster/export_grid.h"
 #include "isohf/restore/raster/raster_samples.h"
 #include "open_archive.h"

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include "formats/georeference/archive_coordinates.h"
-#include "formats/georeference/reference_system.h"
 #include "formats/georeference/source_place.h"
 #include "isohf/error.h"
+#include "isohf/projection/source_system.h"
 #include "isohf/surface.h"
 
 namespace isohf::cli {

@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <limits>
 
-#include "formats/georeference/reference_system.h"
 #include "formats/io/file_stamp.h"
 #include "input/options_source.h"
 #include "isohf/base/number_text.h"
@@ -16,6 +15,7 @@
 #include "isohf/error.h"
 #include "isohf/photo/texture_cutter.h"
 #include "isohf/picture.h"
+#include "isohf/projection/crs.h"
 #include "isohf/resampling.h"
 #include "options/command_line.h"
 #include "options/option_values.h"
@@ -217,6 +217,7 @@ void complete(const CLI::App& line, ConvertCommandOptions& options) {
 Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files) {
   // What is packed shares the memory with what is read from it, and with the tiles.
   options.open.unpacked_bytes = options.work.unpacked_bytes(options.open.unpacked_bytes);
+  options.open.buffer_bytes = options.work.reader_bytes(options.open.buffer_bytes);
   PlanRequest& plan = options.convert.plan;
   options.inputs.onto = plan.ground.projection;
   OpenedInputs opened = open_inputs(std::move(files), options.inputs, options.open, options.work);

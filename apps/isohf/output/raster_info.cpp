@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstring>
 
-#include "formats/georeference/reference_system.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/base/file.h"
 #include "isohf/error.h"
+#include "isohf/projection/source_system.h"
 #include "isohf/sampling/source/source_rows.h"
 #include "options/describe.h"
 #include "output/standard_output.h"

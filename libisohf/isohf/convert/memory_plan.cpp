@@ -82,7 +82,6 @@ class Estimate {
     const std::uint64_t part = row_bytes() * static_cast<std::uint64_t>(info_.height) / kLeastReads;
     memory.scan_step = memory.read_step =
         ReadStep::make(info_, std::min(ration.read_bytes, std::max(part, row_bytes())));
-    memory.source_buffer_bytes = std::max<std::uint64_t>(2 * ration.read_bytes, kMiB);
     memory.tiles_in_flight =
         static_cast<std::size_t>(threads_ * (options_.texture ? kTexturedTilesPerThread : ration.tiles_per_thread));
     memory.members_at_once = ration.members_at_once;
@@ -142,7 +141,7 @@ class Estimate {
     const auto vertices = static_cast<double>(plan_.grid.shape().stored_vertex_count());
     const double program = kProgramBytes + threads_ * kThreadBytes + threads_ * vertices * kBytesPerVertex +
                            kBytesPerTile * static_cast<double>(plan_.grid.tile_count()) +
-                           static_cast<double>(source_.buffer_bytes(memory.source_buffer_bytes)) +
+                           static_cast<double>(source_.buffer_bytes()) +
                            static_cast<double>(map_bytes());
     const double seeds =
         options_.shadow_seeds ? static_cast<double>(SeedRow::memory_bytes(plan_.grid, memory.seeds_in_scratch)) : 0.0;

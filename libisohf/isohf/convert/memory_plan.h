@@ -31,7 +31,6 @@ struct MemoryPlan {
   bool seeds_in_scratch = false;          ///< what a row of tiles brings along for them
   bool planes_in_scratch = false;         ///< rows of tiles that they are made of
   bool residuals_in_scratch = false;      ///< rows of tiles and lattice rows that they are predicted from
-  std::uint64_t source_buffer_bytes = 0;  ///< what the source may keep of decoded blocks
 };
 
 /// The one estimate that plans, bounds and convert() go by. Takes the fastest way that stays within the job's bound, or

@@ -320,7 +320,6 @@ ShardRange find_shard_range(HeightSource& source, const ConvertOptions& options,
   const Plan plan = plan_conversion(source.info(), options);
   const MemoryPlan memory = plan_memory(source, plan, options, job);
   check_memory(source, plan, options, memory, job);
-  source.limit_buffers(memory.source_buffer_bytes);
   const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));
   Conversion conversion{source, options, plan, memory, kernel, Prefilter::make(kernel.filter(), options.acquisition),
                         job};
@@ -359,7 +358,6 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
       plan_memory(source, plan, options, job,
                   (textures ? textures->memory_bytes() : 0) + TilesAround::memory_bytes(plan.grid, beside));
   check_memory(source, plan, options, memory, job);
-  source.limit_buffers(memory.source_buffer_bytes);
   if (options.lossless && info.fill_distance > 0 && &source.as_stored() == &source) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: `lossless` keeps the samples as they were before `fill`, which are out of reach; "

@@ -333,8 +333,8 @@ std::uint64_t fill_memory_bytes(const SourceInfo& info, bool in_scratch) {
   return static_cast<std::uint64_t>(held + narrow + boxes);
 }
 
-std::uint64_t FilledSource::buffer_bytes(std::uint64_t limit) const {
-  return source_->buffer_bytes(limit) + fill_memory_bytes(info_, file_.has_value());
+std::uint64_t FilledSource::buffer_bytes() const {
+  return source_->buffer_bytes() + fill_memory_bytes(info_, file_.has_value());
 }
 
 std::optional<VoidCounts> void_counts(const HeightSource& source, std::optional<std::int64_t> voids) {

@@ -223,13 +223,14 @@ void GeoidSource::read_window(const Window& window, std::span<std::byte> samples
   }
 }
 
-std::uint64_t GeoidSource::buffer_bytes(std::uint64_t limit) const {
-  // Who limits buffers reads about half as much at once as they may hold.
-  const ReadStep step = ReadStep::make(info_, limit / 2);
+std::uint64_t GeoidSource::buffer_bytes() const {
+  // Who reads a strip at a time reads about so much.
+  constexpr std::uint64_t kReadBytes = std::uint64_t{8} << 20U;
+  const ReadStep step = ReadStep::make(info_, kReadBytes);
   const std::uint64_t window = step.most_bytes(info_) / size_bytes(info_.sample_type);
   const std::uint64_t row = 2 * sizeof(double) * static_cast<std::uint64_t>(info_.width);
   const double columns = std::min(static_cast<double>(info_.width) * info_.georeference.spacing_x, 360.0);
-  return source_->buffer_bytes(limit) + window * size_bytes(source_->info().sample_type) + row +
+  return source_->buffer_bytes() + window * size_bytes(source_->info().sample_type) + row +
          model_->strip_bytes(columns);
 }
 

@@ -37,8 +37,7 @@ class GeoidSource final : public HeightSource {
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
   void read_window(const Window& window, std::span<std::byte> samples) override;
-  void limit_buffers(std::uint64_t bytes) override { source_->limit_buffers(bytes); }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override;
+  [[nodiscard]] std::uint64_t buffer_bytes() const override;
 
  private:
   class Model;

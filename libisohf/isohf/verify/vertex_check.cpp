@@ -15,6 +15,7 @@
 #include "isohf/sampling/resample/height_error.h"
 #include "isohf/sampling/source/band_reader.h"
 #include "isohf/sampling/source/source_statistics.h"
+#include "isohf/surface.h"
 #include "isohf/verify.h"
 #include "isohf/verify/accuracy/same_source.h"
 
@@ -117,15 +118,13 @@ class VertexCheck {
                              ? static_cast<double>(way.step.most_bytes(info))
                              : static_cast<double>(std::min(rows + 2 * way.step.rows, info.height)) * row_bytes;
       return reading_bytes(job, vertices) + 24.0 * threads_of(job) * vertices +
-             static_cast<double>(source_.buffer_bytes(kReadBytes)) + raw +
+             static_cast<double>(source_.buffer_bytes()) + raw +
              static_cast<double>(
                  BandReader::memory_bytes(prefilter_, 2, rows, columns.last - columns.first + 1, info)) +
              static_cast<double>(grid_.tile_columns()) * sizeof(VertexReport);
     };
     const auto limit = static_cast<double>(job.bound_bytes());
-    const bool is_free = bytes(ways) <= limit;
-    if (!is_free || job.memory_bytes != 0) source_.limit_buffers(kReadBytes);
-    if (is_free) return ways;
+    if (bytes(ways) <= limit) return ways;
     ways.step = ReadStep::make(info, kLeastReadBytes);
     ways.kept_rows = SourceRows::kept_rows_for(ways.step, rows);
     const SourceGeometry geometry = archive_geometry(metadata_);

@@ -13,9 +13,9 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "formats/georeference/reference_system.h"
 #include "formats/registry.h"
 #include "formats/write/raster_sink.h"
+#include "isohf/projection/crs.h"
 #include "isohf/projection/projection.h"
 #include "isohf/raster.h"
 #include "support/real_files.h"
@@ -50,7 +50,6 @@ RunOptions with_input(const std::string& text) {
 class MapCommand : public testing::Test {
  protected:
   MapCommand() {
-    set_module_folder(ISOHF_BIN_DIR);
     write(folder / "web.tif", 3857);
     write(folder / "utm.tif", 32632);
   }
@@ -58,7 +57,7 @@ class MapCommand : public testing::Test {
   /// Of the slope, around 6.5 East, 44.5 North, whatever the map.
   static void write(const std::string& path, int epsg, double metres_per_unit = 1.0,
                     GeoPoint around = {6.5, kLatitude}) {
-    const auto map = understand_system("EPSG:" + std::to_string(epsg));
+    const auto map = Crs::parse("EPSG:" + std::to_string(epsg));
     const MapPoint middle = map->map_from_geo(around);
     RasterSpec spec;
     spec.width = spec.height = kSize;
@@ -202,7 +201,7 @@ TEST_F(MapCommand, InfoSaysWhereASourceLiesInItsOwnCoordinatesAndInDegrees) {
     EXPECT_NEAR(said.at("lonlat").at("centre").at("longitude").get<double>(), 6.5, 0.001);
     EXPECT_NEAR(said.at("lonlat").at("centre").at("latitude").get<double>(), kLatitude, 0.001);
     EXPECT_NEAR(said.at("centre").at("x").get<double>(),
-                understand_system("EPSG:32632")->map_from_geo({6.5, kLatitude}).easting, kSpacing);
+                Crs::parse("EPSG:32632")->map_from_geo({6.5, kLatitude}).easting, kSpacing);
   }
   for (const char* member : {"bounds", "centre", "lonlat", "map_scale"}) {
     EXPECT_EQ(info("utm.tif").at(member), info("a.isohf").at(member)) << member;
@@ -232,7 +231,7 @@ TEST_F(MapCommand, SampleTakesAndGivesTheInputsOwnCoordinatesAndDegrees) {
        {std::pair<std::string, std::string>{"a.isohf", "EPSG:32632"}, {"b.isohf", "EPSG:3857"}}) {
     SCOPED_TRACE(archive);
     const GeoPoint place{6.51, 44.49};
-    const MapPoint there = understand_system(epsg)->map_from_geo(place);
+    const MapPoint there = Crs::parse(epsg)->map_from_geo(place);
     const std::string crs = fmt::format("{:.6f} {:.6f}\n", there.easting, there.northing);
     const auto sample = [&](const std::vector<std::string>& more, const std::string& input = "") {
       const RunResult result = run_isohf(with_more({"sample", folder / archive}, more), with_input(input));
@@ -259,78 +258,6 @@ TEST_F(MapCommand, SampleTakesAndGivesTheInputsOwnCoordinatesAndDegrees) {
     EXPECT_NEAR(columns[9], place.latitude, 1e-8);
     EXPECT_THAT(sample({"--in", "lonlat", "--with", "lonlat"}, "0 0\n"), testing::StartsWith("outside "));
   }
-}
-
-TEST_F(MapCommand, SampleWithoutTheModuleTakesWhatNeedsNone) {
-  convert("utm.tif", "a.isohf");
-  ASSERT_EQ(convert("web.tif", "b.isohf", {"--to-crs", "auto"}).exit_code, 0);
-  fs::create_directory(folder / "bin");
-  const std::string program = folder / "bin/isohf";
-  fs::copy_file(isohf_path(), program);
-  const auto run = [&](const std::string& archive, const std::string& way) {
-    const json centre = info("a.isohf").at("centre");
-    const bool by_crs = way == "crs";
-    return run_program(
-        {program, "sample", folder / archive, "--in", way},
-        with_input(by_crs ? fmt::format("{} {}", centre.at("x").get<double>(), centre.at("y").get<double>())
-                          : "6.5 44.5"));
-  };
-  // Metres of the source are metres of the world; UTM and the ground's own map are ours.
-  EXPECT_EQ(run("a.isohf", "crs").exit_code, 0);
-  EXPECT_EQ(run("a.isohf", "lonlat").exit_code, 0);
-  EXPECT_EQ(run("b.isohf", "lonlat").exit_code, 0);
-  const RunResult result = run("b.isohf", "crs");
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(result.out, "");
-  EXPECT_THAT(result.err, HasSubstr(".isohf: reference systems need the PROJ module isohf_proj.so"));
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1);
-}
-
-/// What the dynamic linker loads while the program runs.
-std::string loaded_libraries(const std::vector<std::string>& arguments) {
-  const RunResult result = run_program(with_more({"/usr/bin/env", "LD_DEBUG=files", isohf_path()}, arguments));
-  EXPECT_EQ(result.exit_code, 0) << result.out;
-  return result.err;
-}
-
-TEST_F(MapCommand, ProjAndHdf5AreLoadedOnlyWhereTheyAreNeeded) {
-  write_file(folder / "N44E006.hgt", std::string(2 * 1201 * 1201, '\0'));
-  ASSERT_EQ(run_isohf({"convert", folder / "N44E006.hgt", folder / "hgt.isohf", "-q"}).exit_code, 0);
-  convert("utm.tif", "utm.isohf");
-  EXPECT_THAT(loaded_libraries({"info", folder / "web.tif"}), HasSubstr("libproj.so"));
-  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"info", folder / "N44E006.hgt"},
-                                                    {"plan", folder / "N44E006.hgt"},
-                                                    {"info", folder / "hgt.isohf"},
-                                                    {"info", folder / "utm.tif"},
-                                                    {"info", folder / "utm.isohf"},
-                                                    {"verify", folder / "utm.isohf", "--against", folder / "utm.tif"},
-                                                    {"--version"}}) {
-    EXPECT_THAT(loaded_libraries(arguments),
-                Not(AnyOf(HasSubstr("libproj.so"), HasSubstr("libhdf5"), HasSubstr("libnetcdf"))))
-        << arguments.front();
-  }
-}
-
-/// A program without modules beside it.
-TEST_F(MapCommand, WithoutTheModuleAllElseWorksAndALineSaysWhatIsMissing) {
-  fs::create_directory(folder / "bin");
-  const std::string program = folder / "bin/isohf";
-  fs::copy_file(isohf_path(), program);
-  const RunResult result = run_program({program, "convert", folder / "web.tif", folder / "a.isohf"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(result.err, "");
-  EXPECT_THAT(result.out,
-              HasSubstr("map          scale not known: reference systems need the PROJ module isohf_proj.so"));
-  EXPECT_FALSE(info("a.isohf").at("metadata").at("source").contains("ground"));
-  const RunResult said = run_program({program, "info", folder / "a.isohf"});
-  EXPECT_EQ(said.err, "");
-  EXPECT_THAT(said.out, HasSubstr("lon/lat      not known: reference systems need the PROJ module"));
-  const RunResult asked = run_program({program, "convert", folder / "web.tif", folder / "b.isohf", "--to-crs", "auto"});
-  EXPECT_EQ(asked.exit_code, 2);
-  EXPECT_THAT(asked.err, HasSubstr("needs to know the input's own map: reference systems need the PROJ module"));
-  EXPECT_EQ(std::count(asked.err.begin(), asked.err.end(), '\n'), 1);
-  // With it, what an archive does not say is found out.
-  EXPECT_NEAR(info("a.isohf").at("map_scale").at("mean").get<double>(), 1.4, 0.01);
 }
 
 TEST_F(MapCommand, WithoutProjsDatabaseALineSaysSo) {

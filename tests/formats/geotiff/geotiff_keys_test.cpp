@@ -1,4 +1,5 @@
 #include "formats/geotiff/geotiff_keys.h"
+#include "isohf/projection/body.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +7,6 @@
 #include <numbers>
 #include <random>
 
-#include "formats/georeference/units.h"
 #include "isohf/error.h"
 #include "support/rasters/place_at.h"
 

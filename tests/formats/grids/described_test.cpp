@@ -75,14 +75,12 @@ TEST_F(Envi, FeetOfMapInfoAreUsSurveyFeet) {
 
 TEST_F(Envi, SystemsThatMapInfoNamesAreTakenOrTold) {
   write("a.dat", stored_bytes<std::int16_t>({1, 2, 3, 4, 5, 6, 7, 8}));
-#if defined(ISOHF_WITH_PROJ)
   set_module_folder(ISOHF_BIN_DIR);
   write("a.hdr", envi("map info = {UTM, 1, 1, 500000, 4900000, 30, 30, 12, North, North America 1927}\n"));
   EXPECT_EQ(open("a.dat")->info().georeference.system.epsg, 26712);
   write("a.hdr",
         envi("map info = {Geographic Lat/Lon, 1, 1, -110, 40, 0.1, 0.1, North America 1983, units=Degrees}\n"));
   EXPECT_EQ(open("a.dat")->info().georeference.system.epsg, 4269);
-#endif
   write("a.hdr", envi("map info = {State Plane (NAD 83), 1, 1, 600000, 400000, 10, 10, 3104, units=Feet}\n"));
   EXPECT_THAT(open("a.dat")->info().warnings, testing::Contains(HasSubstr("the reference system is left out")));
   write("a.hdr", envi("map info = {Arbitrary, 1, 1, 0, 0, 1, 1}\n"));
@@ -325,12 +323,10 @@ TEST_F(Netcdf, UnitsOfCoordinatesAreReadOrTold) {
   ASSERT_EQ(furlongs->info().warnings.size(), 1U);
   EXPECT_EQ(furlongs->info().warnings[0].kind, Warning::Kind::kLoss);
   EXPECT_THAT(furlongs->info().warnings[0], HasSubstr("\"furlong\", which is no unit that isohf knows"));
-#ifdef ISOHF_WITH_PROJ
   set_module_folder(ISOHF_BIN_DIR);
   OpenOptions options;
   options.reference_system = "EPSG:2263";
   EXPECT_THAT(open_raster(folder / "a.nc", options)->info().warnings, ::testing::Not(Contains(HasSubstr("furlong"))));
-#endif
   EXPECT_THAT(with("x", "radian")->info().warnings, ElementsAre(HasSubstr("\"radian\"")));  // of a view from space
   const auto radians = with("longitude", "radian");
   EXPECT_EQ(radians->info().georeference.unit, HorizontalUnit::kDegree);

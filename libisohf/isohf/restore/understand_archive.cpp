@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/georeference/reference_system.h"
 #include "isohf/error.h"
+#include "isohf/projection/crs.h"
+#include "isohf/projection/crs_operation.h"
+#include "isohf/projection/source_system.h"
 #include "isohf/surface.h"
 
 namespace isohf {

@@ -1,11 +1,9 @@
-#include "formats/georeference/units.h"
-
-#include <fmt/format.h>
+#include "isohf/projection/body.h"
 
 #include <array>
 #include <cctype>
 
-#include "formats/io/text.h"
+#include "isohf/base/text.h"
 
 namespace isohf {
 namespace {
@@ -50,28 +48,6 @@ bool has_word(const std::string& text, const std::string& word) {
 }
 
 }  // namespace
-
-std::string gdal_unit(const std::string& name, bool has_vertical_code) {
-  const bool is_short = !has_vertical_code && (name == "metre" || name == "foot");
-  return is_short ? (name == "metre" ? "m" : "ft") : name;
-}
-
-ReferenceSystem wgs84_system() {
-  ReferenceSystem system;
-  system.name = "WGS 84";
-  system.epsg = 4326;
-  system.body = "Earth";
-  system.semi_major_axis_m = 6378137.0;
-  system.inverse_flattening = 298.257223563;
-  return system;
-}
-
-ReferenceSystem wgs84_utm_zone(int zone, bool is_south) {
-  ReferenceSystem system = wgs84_system();
-  system.epsg = (is_south ? 32700 : 32600) + zone;
-  system.name = fmt::format("WGS 84 / UTM zone {}{}", zone, is_south ? 'S' : 'N');
-  return system;
-}
 
 std::string body_of(std::string_view name, std::optional<double> semi_major_axis_m) {
   const std::string text = lower_case(name);

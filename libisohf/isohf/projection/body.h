@@ -1,0 +1,13 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace isohf {
+
+/// The planet or moon that a reference system's name (or, failing that, its semi-major axis) belongs to; else empty.
+/// Axes: reports of the IAU working group on cartographic coordinates; anything from 6.35e6 m to 6.38e6 m is the Earth.
+[[nodiscard]] std::string body_of(std::string_view name, std::optional<double> semi_major_axis_m);
+
+}  // namespace isohf
