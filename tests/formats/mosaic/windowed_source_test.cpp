@@ -34,11 +34,9 @@ class GlobeSource final : public MemorySource<std::int16_t> {
     info.block_height = 4;
     info.georeference = place_at(Registration::kPoint, HorizontalUnit::kDegree, -180.0, 90.0, 5.0);
   }
-  void limit_buffers(std::uint64_t bytes) override { limit = bytes; }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t asked) const override { return std::min(asked, kUnlimited); }
+  [[nodiscard]] std::uint64_t buffer_bytes() const override { return kKept; }
 
-  static constexpr std::uint64_t kUnlimited = 1000000;
-  std::uint64_t limit = kUnlimited;
+  static constexpr std::uint64_t kKept = 4096;
 };
 
 std::vector<std::int16_t> read(HeightSource& source, const Window& window) {
@@ -63,23 +61,6 @@ TEST(WindowedSource, HasTheSamplesAndThePlaceOfItsWindow) {
   EXPECT_EQ(read(part, {0, 0, 20, 10}), read(whole, {16, 8, 20, 10}));
   EXPECT_EQ(read(part, {3, 4, 17, 2}), read(whole, {19, 12, 17, 2}));
   EXPECT_EQ(&part.as_stored(), &part);
-}
-
-TEST(WindowedSource, LimitsBuffersWhereItsBlocksAreTheSources) {
-  auto inner = std::make_unique<GlobeSource>();
-  GlobeSource& globe = *inner;
-  WindowedSource aligned(std::move(inner), {16, 8, 20, 10});
-  aligned.limit_buffers(5000);
-  EXPECT_EQ(globe.limit, 5000U);
-  EXPECT_EQ(aligned.buffer_bytes(5000), 5000U);
-  for (const Window& window : {Window{15, 8, 20, 10}, Window{16, 7, 20, 10}}) {
-    inner = std::make_unique<GlobeSource>();
-    GlobeSource& other = *inner;
-    WindowedSource part(std::move(inner), window);
-    part.limit_buffers(5000);
-    EXPECT_EQ(other.limit, GlobeSource::kUnlimited) << "blocks would be decoded twice";
-    EXPECT_EQ(part.buffer_bytes(5000), GlobeSource::kUnlimited);
-  }
 }
 
 TEST(ClosedSource, LeavesOutTheLastColumn) {
@@ -123,23 +104,19 @@ TEST(Decorators, HaveTheSamplesAsStoredBehindEveryWindow) {
   EXPECT_EQ(voids, 12);
 }
 
-TEST(Decorators, PassOnWhatBuffersMayHoldAndCountTheirOwn) {
+TEST(Decorators, CountWhatIsKeptBeneathAndTheirOwn) {
   const TemporaryFolder folder;
   write_geoid(folder / "a.pgm", 720, 361, [](double, double) { return 20.0; });
-  auto inner = std::make_unique<GlobeSource>();
-  GlobeSource& globe = *inner;
-  std::unique_ptr<HeightSource> source = filled(std::move(inner));
-  const std::uint64_t fill = fill_memory_bytes(source->info(), false);
-  EXPECT_EQ(source->buffer_bytes(4096), 4096U + fill);
+  std::unique_ptr<HeightSource> source = filled(std::make_unique<GlobeSource>());
+  const std::uint64_t beneath = GlobeSource::kKept + fill_memory_bytes(source->info(), false);
+  EXPECT_EQ(source->buffer_bytes(), beneath);
   source = std::make_unique<ClosedSource>(std::move(source));
-  EXPECT_EQ(source->buffer_bytes(4096), 4096U + fill);
-  GeoidSource moved(std::move(source), {folder / "a.pgm", GeoidShift::kToEllipsoidal});
-  moved.limit_buffers(4096);
-  EXPECT_EQ(globe.limit, 4096U);
+  EXPECT_EQ(source->buffer_bytes(), beneath);
+  const GeoidSource moved(std::move(source), {folder / "a.pgm", GeoidShift::kToEllipsoidal});
   // The strip of the geoid: two degrees of two posts a degree, all the way round, of two bytes; int16 samples of the
-  // largest window (2048 bytes of floats, 7 rows of 72), a row of heights and one of shifts.
-  EXPECT_GT(moved.buffer_bytes(4096), 4096U + fill + 720U * 5U * 2U + 4U * 72U * 2U + 72U * 16U);
-  EXPECT_LT(moved.buffer_bytes(4096), 4096U + fill + 4U * (720U * 5U * 2U + 8U * 72U * 2U + 72U * 16U));
+  // largest window (all 37 rows of 72), a row of heights and one of shifts.
+  EXPECT_GT(moved.buffer_bytes(), beneath + 720U * 5U * 2U + 37U * 72U * 2U + 72U * 16U);
+  EXPECT_LT(moved.buffer_bytes(), beneath + 4U * (720U * 5U * 2U + 37U * 72U * 2U + 72U * 16U));
 }
 
 }  // namespace
