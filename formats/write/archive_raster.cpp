@@ -1,7 +1,6 @@
 #include "formats/write/archive_raster.h"
 #include "isohf/projection/length_unit.h"
 
-
 namespace isohf {
 
 RasterSpec spec_of(const Metadata& metadata, const SampleGrid& grid, const SampleMapping& mapping,

@@ -14,12 +14,12 @@
 #include <optional>
 
 #include "commands/command.h"
-#include "formats/georeference/archive_coordinates.h"
 #include "input/options_source.h"
 #include "isohf/archive.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/number_text.h"
 #include "isohf/error.h"
+#include "isohf/restore/archive_coordinates.h"
 #include "isohf/surface.h"
 #include "open_archive.h"
 #include "options/command_line.h"

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include "formats/georeference/archive_coordinates.h"
-#include "formats/georeference/source_place.h"
 #include "isohf/error.h"
 #include "isohf/projection/source_system.h"
+#include "isohf/restore/archive_coordinates.h"
+#include "isohf/restore/source_place.h"
 #include "isohf/surface.h"
 
 namespace isohf::cli {

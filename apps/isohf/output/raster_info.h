@@ -3,10 +3,10 @@
 #include <optional>
 #include <string>
 
-#include "formats/georeference/source_place.h"
 #include "formats/registry.h"
 #include "isohf/job.h"
 #include "isohf/raster.h"
+#include "isohf/restore/source_place.h"
 #include "output/report.h"
 
 namespace isohf::cli {

@@ -1,8 +1,8 @@
-#include "formats/georeference/archive_coordinates.h"
+#include "isohf/restore/archive_coordinates.h"
 
 #include <memory>
 
-#include "formats/georeference/source_place.h"
+#include "isohf/restore/source_place.h"
 #include "isohf/surface.h"
 
 namespace isohf {

@@ -1,4 +1,4 @@
-#include "formats/georeference/source_place.h"
+#include "isohf/restore/source_place.h"
 
 #include <cmath>
 
