@@ -13,7 +13,7 @@ endif()
 
 # Everything that `cmake --install` lays down, and no test: what scripts/quickstart builds.
 add_custom_target(installed DEPENDS isohf isohf_formats isohf_cli isohf_experiment manual)
-foreach(target IN ITEMS isohf_view isohf_oiio isohf_netcdf)
+foreach(target IN ITEMS isohf_view isohf_oiio)
   if(TARGET ${target})
     add_dependencies(installed ${target})
   endif()

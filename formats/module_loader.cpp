@@ -70,6 +70,16 @@ const void* load_module(const ModuleFile& module) {
                                                    module.needed, module.file, searched, module.option));
 }
 
+std::string find_beside_program(const std::string& file) {
+  Modules& state = modules();
+  const std::lock_guard lock(state.mutex);
+  for (const std::filesystem::path& folder : folders(state.folder)) {
+    std::error_code error;
+    if (std::filesystem::exists(folder / file, error)) return folder / file;
+  }
+  return {};
+}
+
 void set_module_folder(const std::string& folder) {
   Modules& state = modules();
   const std::lock_guard lock(state.mutex);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "isohf/error.h"
 #include "isohf/raster.h"
@@ -20,6 +21,9 @@ struct ModuleFile {
 /// beside the running program, and in ../lib/isohf seen from there.
 /// Throws Error{kUnsupported} where there is none, or it is another version's.
 [[nodiscard]] const void* load_module(const ModuleFile& module);
+
+/// The path of a file of ours that is looked for as modules are; empty where there is none.
+[[nodiscard]] std::string find_beside_program(const std::string& file);
 
 /// The code of a result other than 0 of a module's functions: they return one more than the code.
 [[nodiscard]] inline ErrorCode module_error_code(int result) {

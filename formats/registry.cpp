@@ -15,81 +15,27 @@
 #include "formats/georeference/complete_system.h"
 #include "formats/io/file_stamp.h"
 #include "formats/io/foreign_file.h"
-#include "formats/io/raw_file.h"
-#include "formats/io/text.h"
+#include "formats/io/packed_files.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "isohf/base/file.h"
 #include "isohf/base/handed_in.h"
+#include "isohf/base/text/text.h"
 #include "isohf/base/void_values.h"
 #include "isohf/error.h"
-#include "isohf/projection/crs.h"
-#include "isohf/projection/source_system.h"
+#include "isohf/projection/crs/crs.h"
+#include "isohf/projection/crs/source_system.h"
 #include "isohf/raster.h"
 
 namespace isohf {
 namespace {
 
-/// One native reader: how its files begin, and how one is opened.
-struct Reader {
-  Format format;
-  bool (*recognises)(std::span<const std::byte> head);  ///< nullptr: the extension decides
-  std::unique_ptr<HeightSource> (*open)(const std::string& path, const OpenOptions& options);
-  /// Whether `path` is one by what stands inside or beside it, whatever its name; nullptr: that is not looked for.
-  bool (*described)(const std::string& path) = nullptr;
-  bool in_gzip = false;  ///< reads what is inside a .gz
-};
-
-const std::vector<Reader>& readers() {
-  static const std::vector<Reader> table = {
-      {{"OpenEXR", {".exr"}, exr_library, "takes `channel` and `part`"}, looks_like_exr, open_exr},
-      {{"TIFF", {".tif", ".tiff"}, tiff_library, "takes `channel` and `part`"}, looks_like_tiff, open_tiff},
-      {{"PNG", {".png"}, png_library, "takes `channel` and `encoding`"}, looks_like_png, open_png},
-      {{"WebP", {".webp"}, webp_library, "takes `channel` and `encoding`"}, looks_like_webp, open_webp},
-      {{"PMTiles", {".pmtiles"}, nullptr, "takes `encoding` and `part`"}, looks_like_pmtiles, open_pmtiles},
-      {{"ESRI ASCII grid", {".asc"}}, looks_like_ascii_grid, open_ascii_grid, nullptr, true},
-      {{"GDAL virtual raster", {".vrt"}, nullptr, "takes `channel`"}, looks_like_vrt, open_vrt},
-      {{"netCDF classic, GMT", {".nc", ".grd"}, nullptr, "takes `channel`"},
-       looks_like_netcdf,
-       open_netcdf,
-       nullptr,
-       true},
-      {{"netCDF-4", {".nc4"}, netcdf_library, "takes `channel`"}, looks_like_hdf5, open_netcdf4},
-      {{"ENVI", {".hdr"}, nullptr, "takes `channel`"}, looks_like_envi, open_envi, has_envi_header},
-      {{"GridFloat or EHdr header", {".hdr"}}, looks_like_grid_header, open_header_grid},
-      {{"GridFloat", {".flt"}}, nullptr, open_header_grid},
-      {{"EHdr", {".bil", ".bip", ".bsq"}}, nullptr, open_header_grid},
-      {{"PDS3", {".img", ".lbl"}, nullptr, "takes `channel`"}, looks_like_pds3, open_pds3, has_pds3_label, true},
-      {{"PDS4", {".lblx"}, nullptr, "takes `channel`"}, looks_like_pds4, open_pds4, is_pds4},
-      {{"ISIS3 cube", {".cub", ".lbl"}, nullptr, "takes `channel`"}, looks_like_isis3, open_isis3, nullptr, true},
-      {{"NumPy", {".npy"}}, looks_like_npy, open_npy, nullptr, true},
-      {{"NumPy archive", {".npz"}, nullptr, "takes `channel`"}, nullptr, open_npz},
-      {{"GTOPO30", {".dem"}}, nullptr, open_header_grid},
-      {{"DTED", {".dt0", ".dt1", ".dt2"}}, looks_like_dted, open_dted, nullptr, true},
-      {{"XYZ text", {".xyz"}}, looks_like_xyz, open_xyz, is_xyz, true},
-      {{"SRTM HGT", {".hgt", ".hgt.zip"}}, nullptr, open_hgt, is_zip_of_hgt, true},
-      {{"ZIP, tar", {".zip", ".tar", ".tgz"}, nullptr, "takes `part`"}, looks_like_tar, open_packed, is_zip, true},
-      {{"raw samples",
-        {".r8", ".r16", ".r32", ".f32", ".f64", ".raw"},
-        nullptr,
-        "needs `raw`, or isohf's .json beside"},
-       nullptr,
-       open_raw,
-       nullptr,
-       true},
-  };
-  return table;
-}
-
 /// Enough for every signature.
 constexpr std::size_t kHeadBytes = 512;
-/// Of a gzip file, to inflate so many from.
-constexpr std::size_t kStoredHeadBytes = 4096;
 
 struct Head {
   std::array<std::byte, kHeadBytes> bytes{};
   std::size_t size = 0;
-  bool in_gzip = false;  ///< the bytes are those inside
 };
 
 /// The file's first bytes; refuses whatever is not a readable regular file with something in it.
@@ -103,63 +49,55 @@ Head read_head(const std::string& path) {
   if (!S_ISREG(status.st_mode)) refuse(ErrorCode::kIo, "is not a regular file; a raster must be seekable");
   if (status.st_size == 0) refuse(ErrorCode::kCorrupt, "is empty (0 bytes)");
   Head head;
-  std::array<std::byte, kStoredHeadBytes> stored{};
-  const auto there = std::span(stored).first(File(path, File::Mode::kRead).read_at(0, stored));
-  head.in_gzip = is_gzip_name(path) && looks_like_gzip(there);
-  if (head.in_gzip) {
-    head.size = inflate_head(there, head.bytes);
-  } else {
-    head.size = std::min(there.size(), head.bytes.size());
-    std::copy_n(there.begin(), head.size, head.bytes.begin());
-  }
+  head.size = File(path, File::Mode::kRead).read_at(0, head.bytes);
   return head;
 }
 
 bool has_extension(const std::string& path, const Format& format) {
-  const std::string name = lower_case(without_gzip(path));
+  const std::string name = lower_case(unpacked_name(path));
   return std::any_of(format.extensions.begin(), format.extensions.end(), [&](const std::string& extension) {
     return name.size() > extension.size() && name.ends_with(extension);
   });
 }
 
-const Reader* reader_of(const std::string& path, std::span<const std::byte> head) {
+const Format* reader_of(const std::string& path, std::span<const std::byte> head) {
   if (is_foreign_raster(path, head)) return nullptr;
-  for (const Reader& reader : readers()) {
-    if (reader.recognises != nullptr ? reader.recognises(head) : has_extension(path, reader.format)) return &reader;
+  if (const Format* const format = format_of_head(head)) return format;
+  for (const Format& format : native_formats()) {
+    if (format.described != nullptr && format.described(path)) return &format;
   }
-  for (const Reader& reader : readers()) {
-    if (reader.described != nullptr && reader.described(path)) return &reader;
+  for (const Format& format : native_formats()) {
+    if (format.goes_by_name && has_extension(path, format)) return &format;
   }
   return nullptr;
 }
 
-const Format& raw_format() {
-  const auto raw =
-      std::find_if(readers().begin(), readers().end(), [](const Reader& reader) { return reader.open == open_raw; });
-  return raw->format;
+/// Who reads the file; nullptr where nobody here does.
+const Format* reader_for(const std::string& path, const OpenOptions& options) {
+  if (member_path(path)) return &kPackedFormat;
+  const Head head = read_head(path);
+  const auto bytes = std::span(head.bytes).first(head.size);
+  if (is_compressed(path, bytes)) return &kPackedFormat;
+  return options.raw ? &kRawFormat : reader_of(path, bytes);
 }
 
 }  // namespace
 
 const std::vector<Format>& native_formats() {
-  static const std::vector<Format> formats = [] {
-    std::vector<Format> list;
-    for (const Reader& reader : readers()) list.push_back(reader.format);
-    return list;
-  }();
+  static const std::vector<Format> formats = {
+      kExrFormat,    kTiffFormat, kPngFormat,        kWebpFormat,   kPmtilesFormat, kAsciiGridFormat, kVrtFormat,
+      kNetcdfFormat, kEnviFormat, kHeaderGridFormat, kPds3Format,   kPds4Format,    kIsis3Format,     kNpyFormat,
+      kDtedFormat,   kXyzFormat,  kHgtFormat,        kPackedFormat, kRawFormat};
   return formats;
 }
 
 const Format* native_format_of(const std::string& path, const OpenOptions& options) {
-  const Head head = read_head(path);
-  if (options.raw) return &raw_format();
-  const Reader* reader = reader_of(path, std::span(head.bytes).first(head.size));
-  return reader != nullptr ? &reader->format : nullptr;
+  return reader_for(path, options);
 }
 
 const Format* format_of_head(std::span<const std::byte> head) {
-  for (const Reader& reader : readers()) {
-    if (reader.recognises != nullptr && reader.recognises(head)) return &reader.format;
+  for (const Format& format : native_formats()) {
+    if (format.recognises != nullptr && format.recognises(head)) return &format;
   }
   return nullptr;
 }
@@ -168,11 +106,9 @@ bool is_raster_in_folder(const std::string& path) {
   const std::filesystem::path file(path);
   std::string name = lower_case(file.filename().string());
   if (name.starts_with(".")) return false;
-  for (const char* packed : {".zip", ".tar", ".tgz", ".tar.gz"}) {
-    if (name.ends_with(packed)) return is_archive_of_rasters(path);
-  }
-  if (name.ends_with(".gz")) name.resize(name.size() - 3);
-  if (name.ends_with(".dat")) return has_envi_header(path);
+  if (has_archive_name(name)) return is_archive_of_rasters(path);
+  name = unpacked_name(name);
+  if (name.ends_with(".dat")) return kEnviFormat.described(path);
   // Headers and virtual rasters are about other files, and so is a label beside its image.
   if (name.ends_with(".hdr") || name.ends_with(".vrt")) return false;
   std::error_code none;
@@ -180,11 +116,7 @@ bool is_raster_in_folder(const std::string& path) {
     return std::filesystem::exists(std::filesystem::path(path).replace_extension(extension), none);
   };
   if (name.ends_with(".lbl") && (has_image(".img") || has_image(".IMG") || has_image(".Img"))) return false;
-  return std::ranges::any_of(native_formats(), [&](const Format& format) {
-    return std::ranges::any_of(format.extensions, [&](const std::string_view extension) {
-      return name.size() > extension.size() && name.ends_with(extension);
-    });
-  });
+  return std::ranges::any_of(native_formats(), [&](const Format& format) { return has_extension(name, format); });
 }
 
 std::string library_of(const Format& format) {
@@ -217,7 +149,7 @@ void check_numbers(const SourceInfo& info) {
 class UnchangedSource final : public HeightSource {
  public:
   UnchangedSource(std::unique_ptr<HeightSource> source, const FileStamp& stamp, const OpenOptions& options)
-      : source_(std::move(source)), info_(source_->info()), stamp_(stamp), limit_(options.buffer_bytes) {
+      : source_(std::move(source)), info_(source_->info()), stamp_(stamp) {
     warn_of_feet(options);
     warn_of_latitudes();
     take_heights_of_code();
@@ -230,10 +162,7 @@ class UnchangedSource final : public HeightSource {
     require_unchanged(info_.path, stamp_);
     check_elevations(samples);
   }
-  [[nodiscard]] std::uint64_t buffer_bytes() const override {
-    const std::uint64_t bytes = source_->buffer_bytes(limit_);
-    return bytes != 0 ? bytes : source_->buffer_bytes();
-  }
+  [[nodiscard]] std::uint64_t buffer_bytes() const override { return source_->buffer_bytes(); }
 
  private:
   /// Heights beside coordinates in feet may be either, and nothing of the surface tells which.
@@ -303,7 +232,6 @@ class UnchangedSource final : public HeightSource {
   std::unique_ptr<HeightSource> source_;
   SourceInfo info_;  ///< its path is that of the samples, where a header was named
   FileStamp stamp_;
-  std::uint64_t limit_;
 };
 
 /// A raster whose system the user completes.
@@ -351,33 +279,28 @@ class PlacedSource final : public HeightSource {
   SourceInfo info_;
 };
 
-std::unique_ptr<HeightSource> open_by_head(const std::string& path, const OpenOptions& options) {
-  const Head head = read_head(path);
-  if (options.raw) return open_raw(path, options);
-  const Reader* reader = reader_of(path, std::span(head.bytes).first(head.size));
-  if (head.in_gzip && reader == nullptr) {
-    throw Error(ErrorCode::kUnsupported,
-                path + ": is something unknown in gzip, which isohf does not read; gunzip it first");
-  }
-  if (reader == nullptr) return open_with_oiio(path, options);
-  const auto has_parts = {open_exr, open_tiff, open_packed, open_pmtiles};
-  if (!options.part.empty() && std::ranges::find(has_parts, reader->open) == has_parts.end()) {
+}  // namespace
+
+std::unique_ptr<HeightSource> open_by_content(const std::string& path, const OpenOptions& options) {
+  const Format* const format = reader_for(path, options);
+  if (format == nullptr) return open_with_oiio(path, options);
+  if (!options.part.empty() && !format->takes_part) {
     throw Error(
         ErrorCode::kInvalidArgument,
         path + ": has no parts; `part` is for archives, TIFF and OpenEXR files of several, and zoom levels of tiles");
   }
-  return head.in_gzip && !reader->in_gzip ? open_packed(path, options) : reader->open(path, options);
+  if (!options.encoding.empty() && !format->takes_encoding) {
+    throw Error(ErrorCode::kInvalidArgument, path + ": has no colours; `encoding` is for pictures and tiles of them");
+  }
+  return format->open(path, options);
 }
-
-}  // namespace
 
 std::unique_ptr<HeightSource> open_raster(const std::string& path, const OpenOptions& options) {
   require_known("`registration`", options.registration.value_or(Registration::kPoint), Registration::kPoint);
   if (options.raw) require_known("`raw`: its type", options.raw->type, SampleType::kFloat64);
   try {
     const FileStamp named = FileStamp::of(path);
-    std::unique_ptr<HeightSource> source = open_by_head(path, options);
-    source->limit_buffers(options.buffer_bytes);
+    std::unique_ptr<HeightSource> source = open_by_content(path, options);
     // A header that was named is read for good by now.
     const std::string& samples = source->info().path;
     const FileStamp stamp = samples == path ? named : FileStamp::of(samples);

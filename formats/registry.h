@@ -8,17 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "formats/format.h"
 #include "isohf/raster.h"
 
 namespace isohf {
-
-/// One row of a table of formats.
-struct Format {
-  const char* name;                     ///< "OpenEXR"
-  std::vector<const char*> extensions;  ///< ".exr"; lower case
-  std::string (*library)() = nullptr;   ///< "libpng 1.6.39": who reads or writes it; nullptr: isohf's own code
-  std::string note = {};                ///< what is special: an option that it takes or needs, samples that it holds
-};
 
 /// The formats read natively, in the order in which they are tried.
 [[nodiscard]] const std::vector<Format>& native_formats();
@@ -27,10 +20,13 @@ struct Format {
 /// kCorrupt} as open_raster does for what is no readable file.
 [[nodiscard]] const Format* native_format_of(const std::string& path, const OpenOptions& options);
 
-/// The native format whose signature a file's first 256 bytes hold; nullptr where they hold none.
+/// The native format whose signature a file's first 512 bytes hold; nullptr where they hold none.
 [[nodiscard]] const Format* format_of_head(std::span<const std::byte> head);
 
-/// Whether a file of a folder is one of its rasters: by its extension, of ZIP and tar by the names inside, of .dat by
+/// What open_raster() opens, as its reader has it, before what is common to all is checked and the system completed.
+[[nodiscard]] std::unique_ptr<HeightSource> open_by_content(const std::string& path, const OpenOptions& options);
+
+/// Whether a file of a folder is one of its rasters: by its extension, of archives by the names inside, of .dat by
 /// the header beside it. Headers and labels beside images are not.
 [[nodiscard]] bool is_raster_in_folder(const std::string& path);
 

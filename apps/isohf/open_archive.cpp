@@ -15,7 +15,7 @@ std::string what_else(const std::string& path) {
                        format->name, path);
   }
   const ForeignFile found = foreign_file(path);
-  if (found.is.empty() || found.is == "an isohf archive" || found.is == "a ZIP file") return {};
+  if (found.is.empty() || found.is == "an isohf archive") return {};
   return "is not an isohf archive but " + found.is;
 }
 

@@ -12,9 +12,9 @@
 
 #include "formats/adapters/windowed_source.h"
 #include "isohf/error.h"
-#include "isohf/projection/crs.h"
+#include "isohf/projection/crs/crs.h"
+#include "isohf/projection/crs/source_system.h"
 #include "isohf/projection/other_reading.h"
-#include "isohf/projection/source_system.h"
 
 namespace isohf {
 namespace {

@@ -60,14 +60,9 @@ class MaskedSource final : public HeightSource {
     }
   }
 
-  void limit_buffers(std::uint64_t bytes) override {
-    heights_->limit_buffers(bytes / 2);
-    opacity_->limit_buffers(bytes / 2);
-  }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override {
+  [[nodiscard]] std::uint64_t buffer_bytes() const override {
     const auto samples = static_cast<std::uint64_t>(std::max(kSamplesAtOnce, info_.width));
-    return heights_->buffer_bytes(limit / 2) + opacity_->buffer_bytes(limit / 2) +
-           samples * (size_bytes(stored_.type) + opacity_bytes_);
+    return heights_->buffer_bytes() + opacity_->buffer_bytes() + samples * (size_bytes(stored_.type) + opacity_bytes_);
   }
 
  private:

@@ -15,42 +15,35 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstring>
-#include <iterator>
 #include <mutex>
 #include <new>
 #include <optional>
-#include <set>
+#include <sstream>
 #include <string>
 #include <thread>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "formats/exr/exr_header.h"
-#include "formats/georeference/files_beside.h"
+#include "formats/georeference/sidecars.h"
 #include "formats/io/bands.h"
 #include "formats/io/file_source.h"
-#include "formats/io/text.h"
 #include "formats/open_options.h"
 #include "isohf/base/arena.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
 namespace isohf {
 namespace {
 
-/// After kHeightWords, which may be the name of a channel or its layer in any case, channels called so, in any case; those
-/// of layers of normals and the like are something else, and opacity is last.
+/// After kHeightWords, channels called so, in any case; those of layers of normals and the like are something else.
 constexpr std::array kPreferredChannels = {"y", "z", "depth", "r"};
 constexpr std::array kOtherLayers = {"n", "normal", "normals", "uv", "st", "motion", "velocity", "tangent"};
-/// The order in which OpenImageIO, and so oiiotool, lists the channels of a layer; others follow by name.
-constexpr std::array kListedFirst = {"r",     "red", "g",  "green", "b",  "blue", "y",  "real", "imag",  "a",
-                                     "alpha", "ar",  "ra", "ag",    "ga", "ab",   "ba", "z",    "depth", "zback"};
 
 /// Rows are decoded in runs of at most about this size, so that several chunks are decoded at a time.
-constexpr std::int64_t kBandBytes = std::int64_t{8} << 20U;
+constexpr std::uint64_t kBandBytes = std::uint64_t{8} << 20U;
 
 struct Channel {
   int part = 0;
@@ -70,17 +63,12 @@ std::string shown_name(const Channel& channel) {
   return one_line(full_name(channel));
 }
 
-/// What stands between the dots of a name, in lower case.
-std::vector<std::string> components_of(const std::string& name) {
-  std::vector<std::string> components(1);
-  for (const char c : lower_case(name)) {
-    if (c == '.') {
-      components.emplace_back();
-    } else {
-      components.back() += c;
-    }
-  }
-  return components;
+/// The words between the dots of a name, in lower case.
+std::vector<std::string> words_of(const std::string& name) {
+  std::vector<std::string> words;
+  std::istringstream text(lower_case(name));
+  for (std::string word; std::getline(text, word, '.');) words.push_back(word);
+  return words.empty() ? std::vector<std::string>{""} : words;
 }
 
 template <std::size_t count>
@@ -88,46 +76,38 @@ std::size_t place_in(const std::array<const char*, count>& list, const std::stri
   return static_cast<std::size_t>(std::find(list.begin(), list.end(), word) - list.begin());
 }
 
-/// By layer, then as kListedFirst says, then by name. A layer of X, Y and Z is a vector, in that order.
-void sort_as_listed(std::vector<Channel>& channels) {
-  const auto layer_of = [](const Channel& channel) {
-    const std::size_t dot = channel.name.rfind('.');
-    return dot == std::string::npos ? std::string() : channel.name.substr(0, dot);
-  };
-  const auto last_of = [](const Channel& channel) { return components_of(channel.name).back(); };
-  std::set<std::pair<std::string, std::string>> there;
-  for (const Channel& channel : channels) there.emplace(layer_of(channel), last_of(channel));
-  const auto key = [&](const Channel& channel) {
-    const std::string layer = layer_of(channel);
-    const bool is_vector = there.contains({layer, "x"}) && there.contains({layer, "y"}) && there.contains({layer, "z"});
-    return std::tuple(layer, is_vector ? kListedFirst.size() : place_in(kListedFirst, last_of(channel)), channel.name);
-  };
-  std::ranges::stable_sort(channels, {}, key);
+/// How likely a channel holds elevations, the likeliest 0: "height", then "height.Y" or "terrain.height", then "Y",
+/// then "beauty.Y"; from kNoHeights on its name says nothing of them. Opacity is last.
+constexpr std::size_t kNoHeights = 2 * (kHeightWords.size() + kPreferredChannels.size());
+std::size_t unlikeliness(const Channel& channel) {
+  const std::vector<std::string> words = words_of(channel.name);
+  const bool is_whole = words.size() == 1;
+  std::size_t heights = kHeightWords.size();
+  for (const std::string& word : words) heights = std::min(heights, place_in(kHeightWords, word));
+  if (heights < kHeightWords.size()) return heights + (is_whole ? 0 : kHeightWords.size());
+  if (words.back() == "a" || words.back() == "alpha") return kNoHeights + 3;
+  if (!is_whole && place_in(kOtherLayers, words.front()) < kOtherLayers.size()) return kNoHeights + 2;
+  const std::size_t preferred = place_in(kPreferredChannels, words.back());
+  if (preferred == kPreferredChannels.size()) return kNoHeights + (is_whole ? 0 : 1);
+  return 2 * kHeightWords.size() + preferred + (is_whole ? 0 : kPreferredChannels.size());
 }
 
-bool is_deep(const Imf::Header& header) {
-  return header.hasType() && Imf::isDeepData(header.type());
-}
-
+/// All channels, in the order of the file, which is that of their names in each part.
 std::vector<Channel> channels_of(const Imf::MultiPartInputFile& file) {
   std::vector<Channel> channels;
   for (int part = 0; part < file.parts(); ++part) {
     const Imf::Header& header = file.header(part);
-    std::vector<Channel> of_part;
     for (auto at = header.channels().begin(); at != header.channels().end(); ++at) {
-      Channel channel;
+      Channel& channel = channels.emplace_back();
       channel.part = part;
       if (file.parts() > 1) channel.part_name = header.hasName() ? header.name() : std::to_string(part);
       channel.name = at.name();
       channel.type = at.channel().type;
       channel.subsampled = at.channel().xSampling != 1 || at.channel().ySampling != 1;
-      channel.deep = is_deep(header);
-      of_part.push_back(channel);
+      channel.deep = header.hasType() && Imf::isDeepData(header.type());
     }
-    if (of_part.empty()) continue;
-    sort_as_listed(of_part);
-    channels.insert(channels.end(), of_part.begin(), of_part.end());
   }
+  if (channels.empty()) throw Error(ErrorCode::kCorrupt, "OpenEXR file has no channels");
   return channels;
 }
 
@@ -139,59 +119,33 @@ std::string list_of(const std::vector<Channel>& channels) {
 
 /// Drops the channels of all parts but one, given by its name or number.
 void keep_part(std::vector<Channel>& channels, const std::string& wanted) {
-  const int parts = channels.back().part + 1;
-  int part = -1;
-  for (const Channel& channel : channels) {
-    if (part < 0 && channel.part_name == wanted) part = channel.part;
-  }
-  const char* const end = wanted.data() + wanted.size();
-  int number = 0;
-  const auto [at, error] = std::from_chars(wanted.data(), end, number);
-  if (part < 0 && error == std::errc() && at == end && number >= 0 && number < parts) part = number;
-  if (part < 0) {
-    throw Error(ErrorCode::kInvalidArgument, fmt::format("has no part \"{}\"; its channels are {}, in parts 0...{}",
-                                                         wanted, list_of(channels), parts - 1));
-  }
-  std::erase_if(channels, [part](const Channel& channel) { return channel.part != part; });
+  const std::vector<Channel> all = channels;
+  const bool is_name = std::ranges::count(channels, wanted, &Channel::part_name) > 0;
+  std::erase_if(channels, [&](const Channel& channel) {
+    return (is_name ? channel.part_name : std::to_string(channel.part)) != wanted;
+  });
+  if (!channels.empty()) return;
+  throw Error(ErrorCode::kInvalidArgument, fmt::format("has no part \"{}\"; its channels are {}, in parts 0...{}",
+                                                       wanted, list_of(all), all.back().part));
 }
 
-Channel named_channel(const std::vector<Channel>& channels, const std::string& wanted) {
-  for (const Channel& channel : channels) {
-    if (channel.name == wanted) return channel;
+/// The channel of that name, with or without its part's, or number; if none is wanted, the one that most likely holds
+/// elevations.
+Channel choose_channel(const std::vector<Channel>& channels, const std::string& wanted) {
+  if (wanted.empty()) {
+    const auto key = [](const Channel& channel) { return std::pair(channel.deep, unlikeliness(channel)); };
+    return *std::ranges::min_element(channels, {}, key);
   }
-  for (const Channel& channel : channels) {
-    if (full_name(channel) == wanted) return channel;
+  for (const bool is_full : {false, true}) {
+    for (const Channel& channel : channels) {
+      if ((is_full ? full_name(channel) : channel.name) == wanted) return channel;
+    }
   }
-  std::size_t index = 0;
-  const char* end = wanted.data() + wanted.size();
-  const auto parsed = std::from_chars(wanted.data(), end, index);
-  if (parsed.ec == std::errc() && parsed.ptr == end && index < channels.size()) return channels[index];
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    if (wanted == std::to_string(i)) return channels[i];
+  }
   throw Error(ErrorCode::kInvalidArgument, fmt::format("has no channel \"{}\"; it has {} (or 0...{})", wanted,
                                                        list_of(channels), channels.size() - 1));
-}
-
-/// How likely a channel holds elevations, the likeliest 0: "height", then "height.Y" or "terrain.height", then "Y", then
-/// "beauty.Y"; from kNoHeights on its name says nothing of them.
-constexpr std::size_t kNoHeights = 2 * (kHeightWords.size() + kPreferredChannels.size());
-std::size_t unlikeliness(const Channel& channel) {
-  const std::vector<std::string> components = components_of(channel.name);
-  const std::string& last = components.back();
-  const bool whole = components.size() == 1;
-  std::size_t words = kHeightWords.size();
-  for (const std::string& component : components) words = std::min(words, place_in(kHeightWords, component));
-  if (words < kHeightWords.size()) return words + (whole ? 0 : kHeightWords.size());
-  if (last == "a" || last == "alpha") return kNoHeights + 3;
-  if (!whole && place_in(kOtherLayers, components.front()) < kOtherLayers.size()) return kNoHeights + 2;
-  const std::size_t preferred = place_in(kPreferredChannels, last);
-  if (preferred == kPreferredChannels.size()) return kNoHeights + (whole ? 0 : 1);
-  return 2 * kHeightWords.size() + preferred + (whole ? 0 : kPreferredChannels.size());
-}
-
-/// The channel that most likely holds elevations; of those that are as likely the first, in the first part.
-Channel default_channel(const std::vector<Channel>& channels) {
-  std::vector<Channel> candidates;
-  std::ranges::copy_if(channels, std::back_inserter(candidates), [](const Channel& channel) { return !channel.deep; });
-  return candidates.empty() ? channels.front() : *std::ranges::min_element(candidates, {}, unlikeliness);
 }
 
 SampleType sample_type_of(Imf::PixelType type) {
@@ -223,12 +177,13 @@ auto translated(const std::string& where, Action action) -> decltype(action()) {
 
 class ExrSource final : public HeightSource {
  public:
-  ExrSource(const std::string& path, const OpenOptions& options)
-      : file_(path.c_str(), Imf::globalThreadCount(), false) {
+  /// `rows_of_chunks`  of each part.
+  ExrSource(const std::string& path, const std::vector<std::int64_t>& rows_of_chunks, const OpenOptions& options)
+      : file_(path.c_str(), Imf::globalThreadCount(), false),
+        band_bytes_(static_cast<std::int64_t>(std::min(options.buffer_bytes, kBandBytes))) {
     std::vector<Channel> channels = channels_of(file_);
-    if (channels.empty()) throw Error(ErrorCode::kCorrupt, "OpenEXR file has no channels");
     if (!options.part.empty()) keep_part(channels, options.part);
-    channel_ = options.channel.empty() ? default_channel(channels) : named_channel(channels, options.channel);
+    channel_ = choose_channel(channels, options.channel);
     if (channel_.deep) {
       throw Error(
           ErrorCode::kUnsupported,
@@ -242,8 +197,8 @@ class ExrSource final : public HeightSource {
       throw Error(ErrorCode::kCorrupt, "OpenEXR file is incomplete: its table of chunks has gaps");
     }
     describe(path, channels, options.channel.empty());
-    open_part();
-    read_place_beside(info_, channels.size() == 1 ? 1 : 0);
+    open_part(rows_of_chunks.at(static_cast<std::size_t>(channel_.part)));
+    read_sidecars(info_, channels.size() == 1 ? 1 : 0);
     apply_open_options(info_, options);
   }
 
@@ -261,16 +216,10 @@ class ExrSource final : public HeightSource {
     }
   }
 
-  void limit_buffers(std::uint64_t bytes) override {
-    band_bytes_ = static_cast<std::int64_t>(std::min<std::uint64_t>(bytes, kBandBytes));
-    band_ = {};
-    samples_ = std::vector<std::byte>();
-  }
   /// Of the band, and of OpenEXR's chunks with all their channels: two for each of its threads, and about as much again
   /// as stored and once more while they are decoded.
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override {
-    const auto bytes = static_cast<std::int64_t>(std::min<std::uint64_t>(limit, kBandBytes));
-    const std::int64_t rows = std::min(band_rows(info_.width, bytes), info_.height);
+  [[nodiscard]] std::uint64_t buffer_bytes() const override {
+    const std::int64_t rows = std::min(band_rows(info_.width), info_.height);
     std::int64_t pixel_bytes = 0;
     const Imf::ChannelList& channels = file_.header(channel_.part).channels();
     for (auto at = channels.begin(); at != channels.end(); ++at) {
@@ -283,9 +232,9 @@ class ExrSource final : public HeightSource {
   }
 
  private:
-  /// Rows of whole chunks of so many columns that `bytes` have room for.
-  [[nodiscard]] std::int64_t band_rows(std::int64_t columns, std::int64_t bytes) const {
-    const std::int64_t affordable = bytes / (columns * static_cast<std::int64_t>(sample_bytes_));
+  /// Rows of whole chunks of so many columns that a band has room for.
+  [[nodiscard]] std::int64_t band_rows(std::int64_t columns) const {
+    const std::int64_t affordable = band_bytes_ / (columns * static_cast<std::int64_t>(sample_bytes_));
     return std::max(affordable / info_.block_height * info_.block_height, info_.block_height);
   }
 
@@ -315,7 +264,7 @@ class ExrSource final : public HeightSource {
     }
   }
 
-  void open_part() {
+  void open_part(std::int64_t rows_of_chunk) {
     const Imf::Header& header = file_.header(channel_.part);
     origin_ = header.dataWindow().min;
     if (header.hasType() ? Imf::isTiled(header.type()) : header.hasTileDescription()) {
@@ -325,8 +274,7 @@ class ExrSource final : public HeightSource {
     } else {
       scan_lines_.emplace(file_, channel_.part);
       info_.block_width = info_.width;
-      info_.block_height =
-          std::min(scan_lines_per_chunk(static_cast<std::uint8_t>(header.compression())), info_.height);
+      info_.block_height = std::clamp<std::int64_t>(rows_of_chunk, 1, info_.height);
     }
   }
 
@@ -346,7 +294,7 @@ class ExrSource final : public HeightSource {
     band.columns = up(window.column + window.columns, info_.block_width, info_.width) - band.column;
     band.row = down(row, info_.block_height);
     const std::int64_t wanted = up(window.row + window.rows, info_.block_height, info_.height) - band.row;
-    band.rows = std::min({wanted, band_rows(band.columns, band_bytes_), info_.height - band.row});
+    band.rows = std::min({wanted, band_rows(band.columns), info_.height - band.row});
     band_ = {};  // what is there is overwritten, even if decoding fails half-way
     translated(fmt::format("{}: rows {} to {}", info_.path, band.row, band.row + band.rows - 1), [&] { decode(band); });
     band_ = band;
@@ -377,20 +325,28 @@ class ExrSource final : public HeightSource {
   Imath::V2i origin_;
   SourceInfo info_;
   std::size_t sample_bytes_ = 0;
-  std::int64_t band_bytes_ = kBandBytes;
+  std::int64_t band_bytes_;
   Window band_;                     ///< what samples_ holds
   std::vector<std::byte> samples_;  ///< decoded chunks of the channel
 };
 
-}  // namespace
-
 std::unique_ptr<HeightSource> open_exr(const std::string& path, const OpenOptions& options) {
   return translated(path, [&]() -> std::unique_ptr<HeightSource> {
-    check_exr_headers(path);
+    const std::vector<std::int64_t> rows_of_chunks = check_exr_headers(path);
     start_exr_threads();
-    return std::make_unique<ExrSource>(path, options);
+    return std::make_unique<ExrSource>(path, rows_of_chunks, options);
   });
 }
+
+}  // namespace
+
+const Format kExrFormat = {.name = "OpenEXR",
+                           .extensions = {".exr"},
+                           .library = [] { return std::string("OpenEXR " OPENEXR_VERSION_STRING); },
+                           .note = "takes `channel` and `part`",
+                           .open = open_exr,
+                           .recognises = looks_like_exr,
+                           .takes_part = true};
 
 void start_exr_threads() {
   static std::once_flag once;
@@ -398,10 +354,6 @@ void start_exr_threads() {
     Imf::setGlobalThreadCount(
         possible_threads(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U))));
   });
-}
-
-std::string exr_library() {
-  return "OpenEXR " OPENEXR_VERSION_STRING;
 }
 
 }  // namespace isohf

@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "isohf/base/handed_in.h"
-#include "isohf/base/text.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
-#include "isohf/projection/crs.h"
-#include "isohf/projection/source_system.h"
+#include "isohf/projection/crs/crs.h"
+#include "isohf/projection/crs/source_system.h"
 
 namespace isohf {
 namespace {

@@ -8,11 +8,11 @@
 #include <span>
 
 #include "formats/io/raw_file.h"
-#include "formats/io/text.h"
 #include "formats/open_options.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
+#include "isohf/projection/crs/source_system.h"
 #include "isohf/projection/length_unit.h"
-#include "isohf/projection/source_system.h"
 #include "isohf/raster.h"
 
 namespace isohf {

@@ -3,98 +3,74 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
-#include <unordered_map>
+#include <string>
 #include <vector>
 
 #include "formats/geotiff/tiff_file.h"
 #include "formats/io/block_cache.h"
-#include "formats/io/raw_file.h"
 #include "isohf/raster.h"
 
 namespace isohf {
 
-/// Handles on one directory for any number of threads, opened when first needed.
-class TiffHandlePool {
- public:
-  TiffHandlePool(const RawFile& file, std::uint32_t directory) : file_(&file), directory_(directory) {}
-
-  [[nodiscard]] std::unique_ptr<TiffHandle> take();
-  void give_back(std::unique_ptr<TiffHandle> handle);
-
- private:
-  const RawFile* file_;
-  std::uint32_t directory_;
-  std::mutex mutex_;
-  std::vector<std::unique_ptr<TiffHandle>> idle_;
-};
-
-/// Reads windows of one sample plane of a TIFF directory, in stored row order.
-///
-/// Three ways, chosen by the layout:
-///  - strips whose bytes are the samples: read from the file straight into the window;
-///  - tiles and strips of moderate size: decoded whole, in parallel, into a cache of two rows of blocks (or 16 MiB);
-///  - compressed strips too large to hold: decoded row by row in order, the last 16 MiB of rows kept. Going back
-///    beyond those decodes the strip again from its start.
+/// Reads windows of one sample of each pixel of a TIFF directory, or of all of them interleaved, in stored row order.
+/// Blocks are decoded whole, in parallel, into a cache of two rows of blocks (16 MiB at least, if there are so many).
+/// Samples of 1 bit become bytes of 0 and 1.
 class TiffBlocks {
  public:
-  /// `channel` is the sample of each pixel of `image` to read. Checks every block's place in the file.
-  /// Throws Error: kCorrupt for blocks that lie outside the file or are absurdly large, kUnsupported for sizes beyond
-  /// isohf's bounds.
-  TiffBlocks(const RawFile& file, const TiffLayout& layout, TiffMainImage image, int channel);
+  static constexpr int kAllSamples = -1;
 
-  /// Samples of blocks that are not stored; 0 without. One sample in host byte order.
+  /// `channel` is the sample to read. cache_bytes  most bytes of decoded samples to keep, but for two blocks. Throws
+  /// Error: kCorrupt for blocks outside the file, or too short for what they must hold; kUnsupported for blocks too
+  /// large to decode whole.
+  TiffBlocks(std::string path, const TiffLayout& layout, TiffMainImage image, int channel,
+             std::uint64_t cache_bytes = UINT64_MAX);
+
+  /// One sample in host byte order, for blocks that are not stored; 0 without.
   void set_fill(std::span<const std::byte> sample);
 
-  /// Fills `samples` [window.columns * window.rows samples]. Throws Error{kCorrupt, kIo}.
+  /// Fills `samples` [window.columns * window.rows pixels]. Throws Error{kCorrupt}.
   void read(const Window& window, std::span<std::byte> samples);
 
   [[nodiscard]] std::uint64_t block_count() const { return block_count_; }
   [[nodiscard]] std::uint64_t missing_blocks() const { return missing_; }
-  /// A smaller bound for the cache: whole blocks that are read in order need none. Large strips that are decoded row by
-  /// row keep theirs.
-  void limit_cache(std::uint64_t bytes);
-  /// What the cache takes at most within that bound.
-  [[nodiscard]] std::uint64_t cache_bytes(std::uint64_t limit) const;
-  /// Rows that decode together.
-  [[nodiscard]] std::int64_t unit_rows() const { return mode_ == Mode::kDirect ? 1 : unit_rows_; }
+  /// Most bytes of the cache.
+  [[nodiscard]] std::uint64_t buffer_bytes() const { return cache_->capacity() * cache_->block_bytes(); }
 
  private:
-  enum class Mode { kDirect, kBlocks, kRows };
-  struct Unit;
+  struct Unit {
+    std::int64_t across = 0;
+    std::int64_t down = 0;
+    std::byte* bytes = nullptr;  ///< in the cache, or of the window that is read
+    bool is_decoded = false;
+    bool is_in_place = false;  ///< decoded where it is delivered
+  };
 
-  void choose_mode(std::uint64_t largest_block_bytes);
-  void read_direct(const Window& window, std::span<std::byte> samples);
-  void read_strip_rows(const Window& part, TiffBlockSpan strip, std::int64_t first_strip_row, std::byte* out,
-                       std::vector<std::byte>& scratch);
-  void read_units(const Window& window, std::span<std::byte> samples);
-  void decode_units(std::span<Unit> units);
-  void decode_unit(const Unit& unit, TiffHandle& handle) const;
-  void decode_rows(const Unit& unit);
-  void fill(std::byte* out, std::int64_t count) const;
-  void pick_channel(const std::byte* pixels, std::byte* out, std::int64_t count) const;
+  void check_blocks(TiffHandle& handle);
+  void decode(std::vector<Unit>& units);
+  void decode(const Unit& unit, TiffHandle& handle) const;
+  [[nodiscard]] bool can_read_in_place(const Unit& unit, const Window& window) const;
+  /// Whether the decoded bytes of a block are those of its delivered pixels.
+  [[nodiscard]] bool is_stored_as_delivered() const;
+  void copy_out(const Unit& unit, const Window& window, std::span<std::byte> samples) const;
+  [[nodiscard]] std::unique_ptr<TiffHandle> take_handle();
+  void give_back(std::unique_ptr<TiffHandle> handle);
 
-  const RawFile& file_;
+  std::string path_;
   TiffLayout layout_;
   std::uint32_t directory_;
   int channel_;
-  std::int64_t plane_;  // of blocks, 0 where interleaved
   std::size_t sample_bytes_;
-  Mode mode_ = Mode::kBlocks;
-  std::int64_t unit_rows_ = 0;  // rows of one unit of the cache: a block, or some rows of a large strip
+  std::size_t pixel_bytes_;  ///< delivered
   std::uint64_t block_count_ = 0;
   std::uint64_t missing_ = 0;
   std::array<std::byte, 8> fill_ = {};
   std::optional<BlockCache> cache_;
-  mutable TiffHandlePool handles_;
-  std::unique_ptr<TiffHandle> in_order_;  // Mode::kRows
-  std::int64_t next_row_ = -1;            // the row that in_order_ delivers next; -1: none
-  bool map_strips_ = false;
-  std::size_t since_forgotten_bytes_ = 0;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<TiffHandle>> idle_;  ///< one for each thread that has decoded
 };
 
 }  // namespace isohf

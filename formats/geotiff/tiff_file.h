@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -10,7 +11,9 @@
 #include <vector>
 
 #include "formats/geotiff/geotiff_keys.h"
-#include "formats/io/raw_file.h"
+#include "formats/geotiff/tiff_io.h"
+
+struct tiff;  // libtiff's TIFF
 
 namespace isohf {
 
@@ -24,31 +27,26 @@ struct TiffLayout {
   std::uint16_t compression = 1;
   std::uint16_t photometric = 1;
   std::uint16_t orientation = 1;
-  int alpha_sample = -1;  ///< which sample is opacity; -1 where none is
+  int alpha_sample = -1;  ///< which sample is opacity; -1 if none is
   bool tiled = false;
   bool separate = false;  ///< one plane of blocks for each sample
-  bool big_endian = false;
-  bool bits_reversed = false;  ///< FillOrder 2
   std::int64_t block_width = 0;
   std::int64_t block_height = 0;
   std::int64_t blocks_across = 0;
   std::int64_t blocks_down = 0;
-  std::uint64_t table_entries = 0;  ///< in the shorter of the tables of the blocks' offsets and sizes
 
   [[nodiscard]] std::uint64_t block_index(std::int64_t plane, std::int64_t across, std::int64_t down) const {
     return static_cast<std::uint64_t>((plane * blocks_down + down) * blocks_across + across);
   }
-  /// Samples of one pixel that a block holds.
+  /// Samples of one pixel in a block.
   [[nodiscard]] std::int64_t interleaved() const { return separate ? 1 : samples_per_pixel; }
-  [[nodiscard]] std::int64_t sample_bytes() const { return bits_per_sample / 8; }
-  /// Rows that block row `down` really holds: tiles are whole, the last strip is cut.
-  [[nodiscard]] std::int64_t stored_rows(std::int64_t down) const;
-  /// Whether the bytes in the file are the samples, but for their byte order.
-  [[nodiscard]] bool plain() const { return compression == 1 && !bits_reversed; }
+  /// Rows stored in block row `down`: tiles are whole, the last strip is cut.
+  [[nodiscard]] std::int64_t stored_rows(std::int64_t down) const {
+    return tiled ? block_height : std::min(block_height, height - down * block_height);
+  }
+  /// Decoded bytes of a row of a block; samples of less than a byte fill the row's last byte.
+  [[nodiscard]] double block_row_bytes() const;
 };
-
-/// The name of a compression scheme, for messages.
-[[nodiscard]] std::string tiff_compression_name(std::uint16_t compression);
 
 /// Tags beside the layout.
 struct TiffTags {
@@ -66,61 +64,73 @@ struct TiffBlockSpan {
 
 /// The directories (images) of a file.
 struct TiffDirectories {
-  std::uint32_t main = 0;             ///< the one wanted of those that are neither a reduced image nor a mask
+  std::uint32_t main = 0;             ///< the wanted one among those that are neither a reduced image nor a mask
   std::optional<std::uint32_t> mask;  ///< the main image's transparency mask, which follows it
-  std::uint32_t images = 0;           ///< that are full-size ones
-  bool has_broken = false;            ///< one behind the last that was read is broken
+  std::uint32_t images = 0;           ///< full-size ones
+  std::uint32_t count = 0;            ///< of all kinds
+  bool has_broken = false;            ///< the directory after the last one read is damaged
 };
 
-struct TiffMainImage;
+/// Makes libtiff know the tags of GeoTIFF and GDAL; for the whole process, once. Call it before a file is opened.
+void define_geotiff_tags();
 
-/// One libtiff handle on a directory; not thread-safe. Nothing of libtiff shows outside its source file.
+/// One libtiff handle on a directory; not thread-safe.
 class TiffHandle {
  public:
-  /// `mapped`: compressed bytes are mapped instead of read, for strips too large to buffer.
-  TiffHandle(const RawFile& file, std::uint32_t directory, bool mapped);
+  enum class PlainStrips { kChopped, kAsStored };
+
+  /// libtiff chops one large uncompressed strip into small ones, unless it is left as stored.
+  /// Throws Error{kCorrupt} if the directory cannot be read.
+  explicit TiffHandle(const std::string& path, std::uint32_t directory = 0, PlainStrips plain = PlainStrips::kChopped);
   TiffHandle(const TiffHandle&) = delete;
   TiffHandle& operator=(const TiffHandle&) = delete;
   ~TiffHandle();
 
-  /// Decodes block `index` into host byte order; `bytes` is exactly its decoded size. Throws Error{kCorrupt, kIo}.
+  /// Decodes block `index` into host byte order; `bytes` is exactly its decoded size. Throws Error{kCorrupt}.
   void decode_block(std::uint64_t index, bool tiled, std::span<std::byte> bytes);
-
-  /// Decodes one row of a stripped image. Rows of one strip must be asked for in order, from its first.
-  void decode_row(std::int64_t row, std::int64_t plane, std::span<std::byte> bytes);
-
-  /// Gives mapped pages that were read back to the system.
-  void forget_mapped();
-
-  /// Throws Error{kCorrupt} where the table of blocks has no such entry.
+  /// Throws Error{kCorrupt} if the table of blocks has no such entry.
   [[nodiscard]] TiffBlockSpan block_span(std::uint64_t index);
 
   [[nodiscard]] TiffLayout read_layout();
   [[nodiscard]] TiffTags read_tags();
-  /// Red, green and blue of every value that a sample of the image can have. Throws Error{kCorrupt} without a palette.
+  /// Red, green and blue of each value of a sample. Throws Error{kCorrupt} without a palette.
   [[nodiscard]] std::vector<std::array<std::uint8_t, 3>> read_palette();
 
-  /// Room that the user of the handle may use while he holds it.
-  std::vector<std::byte> scratch;
+  /// The kinds of images from the current directory on, as far as they can be read. Leaves the handle at the last one.
+  [[nodiscard]] TiffDirectories walk(std::uint32_t wanted);
 
  private:
-  friend TiffMainImage open_main_image(const RawFile& file, std::uint32_t wanted);
-  struct Impl;
-  explicit TiffHandle(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
+  /// Throws Error{kIo} if reading failed, else Error{kCorrupt} with libtiff's words for what went wrong, if it has any.
+  [[noreturn]] void fail(const std::string& problem) const;
+  template <typename T>
+  [[nodiscard]] T field(std::uint32_t tag, T otherwise) const;
+  template <typename T>
+  [[nodiscard]] std::vector<T> array(std::uint32_t tag) const;
+  [[nodiscard]] std::string text(std::uint32_t tag) const;
+
+  std::string path_;
+  TiffIo io_;
+  struct Messages {
+    std::string error;                  ///< the first one
+    std::vector<std::string> warnings;  ///< the first few
+  } messages_;
+  tiff* tiff_ = nullptr;
 };
 
-/// What a file holds, and a handle on its main image.
+/// What a file holds, and a handle on one of its images.
 struct TiffMainImage {
   TiffDirectories directories;
   std::unique_ptr<TiffHandle> handle;
 };
 
-/// A handle on another directory of the file, as its main image. Throws Error{kCorrupt} where it cannot be read.
-[[nodiscard]] TiffMainImage open_image(const RawFile& file, std::uint32_t directory);
+/// A handle on any directory of the file, as its main image. Throws Error{kIo, kCorrupt}.
+[[nodiscard]] TiffMainImage open_image(const std::string& path, std::uint32_t directory);
 
-/// Opens the full-size image of a number, from 0 on, and the file once where it holds one alone: of ten thousand small files in a mosaic, opening is most of the work.
-/// Throws Error{kCorrupt} where not even the first directory can be read; Error{kInvalidArgument} without such an image.
-[[nodiscard]] TiffMainImage open_main_image(const RawFile& file, std::uint32_t wanted = 0);
+/// Opens the full-size image of a number, from 0 on; a file of one image is opened once. Throws Error{kIo};
+/// Error{kCorrupt} if not even the first directory can be read; Error{kInvalidArgument} without such an image.
+[[nodiscard]] TiffMainImage open_main_image(const std::string& path, std::uint32_t wanted = 0);
+
+/// "libtiff 4.5.0": the library as it runs.
+[[nodiscard]] std::string tiff_library();
 
 }  // namespace isohf

@@ -2,13 +2,17 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdlib>
 
-#include "formats/georeference/files_beside.h"
-#include "formats/io/text.h"
+#include "formats/georeference/sidecars.h"
 #include "formats/io/text_tokens.h"
 #include "formats/open_options.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
+#include "isohf/projection/length_unit.h"
 
 namespace isohf {
 namespace {
@@ -91,8 +95,42 @@ void DescribedSource::set_size(double width, double height) {
   info_.height = count(height, "the number of rows");
 }
 
+std::optional<double> DescribedSource::constant(const std::string& text) const {
+  double value = 0.0;
+  char* digits = nullptr;
+  const bool is_hexadecimal = text.starts_with("0x") || text.starts_with("0X");
+  const auto base = is_hexadecimal ? 16 : static_cast<int>(std::strtoul(text.c_str(), &digits, 10));
+  if (!is_hexadecimal && (*digits != '#' || base < 2 || base > 16)) {
+    return read_decimal(text, value) && std::isfinite(value) ? std::optional(value) : std::nullopt;
+  }
+  const std::uint64_t bits = std::strtoull(is_hexadecimal ? text.c_str() : digits + 1, nullptr, base);
+  const auto low = static_cast<std::uint32_t>(bits);
+  switch (info_.sample_type) {
+    case SampleType::kFloat32:
+      return layout_.stored_as == StoredAs::kVaxFloat ? float_from_vax(low) : std::bit_cast<float>(low);
+    case SampleType::kFloat64:
+      return layout_.stored_as == StoredAs::kItself ? std::bit_cast<double>(bits) : static_cast<double>(bits);
+    case SampleType::kInt8:
+      return static_cast<std::int8_t>(bits);
+    case SampleType::kInt16:
+      return static_cast<std::int16_t>(bits);
+    case SampleType::kInt32:
+      return static_cast<std::int32_t>(bits);
+    default:
+      return static_cast<double>(bits);
+  }
+}
+
 void DescribedSource::set_void(double value) {
-  if (const auto stored = void_value_as_stored(info_.sample_type, value)) info_.void_values.push_back(*stored);
+  const auto stored = void_value_as_stored(info_.sample_type, value);
+  if (stored && std::ranges::find(info_.void_values, *stored) == info_.void_values.end())
+    info_.void_values.push_back(*stored);
+}
+
+void DescribedSource::set_unit(const std::string& unit) {
+  const std::optional<LinearUnit> length = linear_unit(unit);
+  info_.vertical_unit = length ? length->name : printable(lower_case(unit));
+  info_.metres_per_vertical_unit = length ? length->metres : 1.0;
 }
 
 void DescribedSource::set_scale(double scale, double offset, const char* key) {
@@ -114,6 +152,11 @@ void DescribedSource::place_by_corner(double west, double north, double dx, doub
   place.origin_y = north - dy / 2.0;
 }
 
+void DescribedSource::lose_place(const char* why) {
+  info_.georeference.unit = HorizontalUnit::kUnknown;
+  info_.warnings.push_back(loss(std::string(why) + "; its place is left out"));
+}
+
 void DescribedSource::require_samples() const {
   const double end = layout_.end_bytes(info_);
   if (!(end <= static_cast<double>(file_->size_bytes()))) {
@@ -125,7 +168,7 @@ void DescribedSource::require_samples() const {
 
 void DescribedSource::finish(const OpenOptions& options, int band) {
   require_samples();
-  read_files_beside(info_, band);
+  read_sidecars(info_, band);
   bound_undeclared_voids(info_);
   info_.block_width = info_.width;
   // The samples of a column follow each other: some rows at once cost what one does.

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <array>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -31,8 +31,8 @@ using HeaderWords = std::map<std::string, std::string, std::less<>>;
 class DescribedSource : public PlainSource {
  protected:
   /// data, header  their paths, which may be the same
-  DescribedSource(const std::string& data, const char* format, std::string header, const OpenOptions& options)
-      : PlainSource(data, format, options), header_(std::move(header)) {}
+  DescribedSource(const std::string& data, const char* format, std::string header)
+      : PlainSource(data, format), header_(std::move(header)) {}
 
   /// Throws Error naming the header.
   [[noreturn]] void refuse(ErrorCode code, const std::string& what) const;
@@ -43,14 +43,22 @@ class DescribedSource : public PlainSource {
   /// A whole number from `least` on.
   [[nodiscard]] std::int64_t count(double value, const std::string& what, double least = 1.0) const;
   void set_size(double width, double height);
+  /// What a label gives as a value of a sample: a number, or the bits of one ("16#FF7FFFFB#", "0xFF7FFFFB"), once type and
+  /// layout are known; nullopt for other texts ("N/A").
+  [[nodiscard]] std::optional<double> constant(const std::string& text) const;
+  /// Leaves aside what no sample can hold.
   void set_void(double value);
+  /// The unit of elevations.
+  void set_unit(const std::string& unit);
   /// Throws Error{kCorrupt} where `scale`, which `key` gives, is 0 or one of the two is not finite.
   void set_scale(double scale, double offset, const char* key);
   /// The place of the first sample's outer corner in the North-West, and the spacing. Cells are areas.
   void place_by_corner(double west, double north, double dx, double dy);
+  /// Leaves the place out, with a warning that says why.
+  void lose_place(const char* why);
   /// Throws Error{kCorrupt} where the file has fewer bytes than the description says.
   void require_samples() const;
-  /// Requires the samples, and takes what lies beside it, of `band` as read_auxiliary_metadata has it, and what the user
+  /// Requires the samples, and takes what lies beside it, of `band` as read_sidecars has it, and what the user
   /// says.
   void finish(const OpenOptions& options, int band = 1);
 

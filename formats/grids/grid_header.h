@@ -1,65 +1,61 @@
 #pragma once
 
 #include <cstdint>
-#include <initializer_list>
+#include <functional>
+#include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "isohf/raster.h"
 
 namespace isohf {
 
-/// From here on, either side of 0, floats mean voids: they are written with 6 to 17 digits, seldom the same ones twice.
-constexpr double kBeyondAnyHeight = 1e38;
-
-/// The words of an ESRI grid header ("ncols 4", "NODATA_value -9999"), in any order; names are compared in lower case
-/// without underscores and hyphens.
+/// The words of an ESRI grid header ("ncols 4", "NODATA_value -9999"), in any order. Names are compared by plain_name().
 class GridHeader {
  public:
   /// `path` is for messages.
   explicit GridHeader(std::string path) : path_(std::move(path)) {}
 
-  /// Throws Error{kCorrupt} where the header has `name` already with another value.
-  void add(std::string_view name, std::string_view value, std::uint64_t line);
+  /// In lower case, without underscores and hyphens, and one for all that mean the same: "xdim" is "dx".
+  [[nodiscard]] static std::string plain_name(std::string_view name);
 
-  [[nodiscard]] bool has(std::string_view name) const { return find({name}) != nullptr; }
-  /// The value of the first of `names` that there is, lower case names without underscores.
-  [[nodiscard]] std::optional<std::string> text(std::initializer_list<std::string_view> names) const;
-  /// Throws Error{kCorrupt} naming the line where the value is no number.
-  [[nodiscard]] std::optional<double> number(std::initializer_list<std::string_view> names) const;
-  /// A whole number of at least `least`. Throws Error{kCorrupt} where the value is none.
-  [[nodiscard]] std::optional<std::int64_t> count(std::initializer_list<std::string_view> names,
-                                                  std::int64_t least) const;
+  /// Throws Error{kCorrupt} if the header has `name` already with another value.
+  void add(std::string_view name, std::string_view value, std::uint64_t line);
+  /// Refuses the first word whose plain name is none of `names`.
+  void require_only(std::span<const std::string_view> names) const;
+
+  [[nodiscard]] bool has(std::string_view name) const { return find(name) != nullptr; }
+  /// The value in lower case.
+  [[nodiscard]] std::optional<std::string> text(std::string_view name) const;
+  /// A whole number of at least `least`. Throws Error{kCorrupt} naming the line if the value is none.
+  [[nodiscard]] std::optional<std::int64_t> count(std::string_view name, std::int64_t least) const;
 
   /// nrows and ncols, both required, into info.width and info.height.
   void read_size(SourceInfo& info) const;
-  /// Spacing and origin into info.georeference: cellsize or dx and dy or xdim and ydim; xllcorner or xllcenter (the
-  /// first cell's centre), ulxmap (the upper left cell's centre), each axis by itself. Cells are areas.
+  /// Spacing and origin into info.georeference: cellsize or dx and dy; xllcorner or xllcenter (the first cell's centre),
+  /// ulxmap (the upper left cell's centre), each axis by itself. Cells are areas.
   /// Throws Error{kCorrupt}: a spacing that is not positive, two origins of one axis.
   void read_place(SourceInfo& info) const;
-  /// The void value into info: from +-1e38 on everything beyond it is void as well, for its digits vary.
-  void read_void(SourceInfo& info) const;
-
-  /// Refuses the first word that is none of `names`, all lower case without underscores.
-  void require_only(const std::vector<std::string_view>& names) const;
-
-  [[nodiscard]] static std::string plain_name(std::string_view name);
+  /// The nodata value into info. Beyond 1e30 its digits vary, and everything beyond is nodata as well.
+  void read_nodata(SourceInfo& info) const;
 
  private:
   struct Word {
-    std::string name;
+    std::string name;  ///< as it is spelled
     std::string value;
     std::uint64_t line = 0;
   };
-  [[nodiscard]] const Word* find(std::initializer_list<std::string_view> names) const;
+  [[nodiscard]] const Word* find(std::string_view name) const;
   [[noreturn]] void refuse(const Word& word, std::string_view required) const;
-  [[nodiscard]] double spacing(std::initializer_list<std::string_view> names) const;
-  [[nodiscard]] std::optional<double> first_centre(std::string_view axis, double spacing, std::int64_t count) const;
+  [[nodiscard]] double number(const Word& word) const;
+  /// 0 if there is no such word.
+  [[nodiscard]] double spacing(std::string_view name) const;
+  [[nodiscard]] std::optional<double> origin(char axis, double spacing, std::int64_t count) const;
 
   std::string path_;
-  std::vector<Word> words_;
+  std::map<std::string, Word, std::less<>> words_;  ///< by plain name
 };
 
 }  // namespace isohf

@@ -4,20 +4,20 @@
 #include <cctype>
 #include <cmath>
 #include <optional>
+#include <regex>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "formats/georeference/files_beside.h"
+#include "formats/georeference/sidecars.h"
 #include "formats/grids/plain_samples.h"
 #include "formats/io/bands.h"
-#include "formats/io/text.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "formats/write/encoders.h"
 #include "isohf/base/bytes.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
-#include "isohf/projection/source_system.h"
+#include "isohf/projection/crs/source_system.h"
 #include "isohf/raster.h"
 
 namespace isohf {
@@ -29,53 +29,30 @@ struct HgtCorner {
   int latitude = 0;   ///< -90...90
 };
 
-/// The corner in a word of exactly seven letters: hemisphere and two digits, hemisphere and three digits, in any case.
-std::optional<HgtCorner> corner_in(std::string_view word) {
-  const auto is_one_of = [&](std::size_t at, std::string_view letters) {
-    return letters.find(static_cast<char>(std::tolower(static_cast<unsigned char>(word[at])))) != letters.npos;
-  };
-  const auto digits = [&](std::size_t begin, std::size_t count) {
-    int value = 0;
-    for (std::size_t i = begin; i < begin + count; ++i) {
-      if (std::isdigit(static_cast<unsigned char>(word[i])) == 0) return -1;
-      value = value * 10 + (word[i] - '0');
-    }
-    return value;
-  };
-  if (!is_one_of(0, "ns") || !is_one_of(3, "ew")) return std::nullopt;
-  const int latitude = digits(1, 2);
-  const int longitude = digits(4, 3);
-  if (latitude < 0 || latitude > 90 || longitude < 0 || longitude > 180) return std::nullopt;
-  return HgtCorner{is_one_of(3, "w") ? -longitude : longitude, is_one_of(0, "s") ? -latitude : latitude};
-}
-
-/// What the name of an SRTM tile states: "N44E006.hgt", "s35e145.SRTMGL1.hgt.zip", "srtm_n44e006_v3.hgt": the one
-/// place in it that stands between other characters than letters and digits, or at its beginning. nullopt: none, or
-/// several. Directories may precede the name.
+/// What the name of an SRTM tile states: "N44E006.hgt", "s35e145.SRTMGL1.hgt", "srtm_n44e006_v3.hgt": the one place in it
+/// that stands between other characters than letters and digits, or at its beginning. nullopt: none, or several.
 std::optional<HgtCorner> hgt_corner_of(const std::string& path) {
-  const std::string name = path.substr(path.find_last_of('/') + 1);
-  constexpr std::size_t kLength = 7;
-  const auto is_inside_word = [&](std::size_t at) {
+  static const std::regex kPlace("([ns])([0-9]{2})([ew])([0-9]{3})");
+  const std::string name = lower_case(path.substr(path.find_last_of('/') + 1));
+  const auto is_in_word = [&](std::size_t at) {
     return at < name.size() && std::isalnum(static_cast<unsigned char>(name[at])) != 0;
   };
-  if (name.size() < kLength) return std::nullopt;
-  if (const auto first = corner_in(std::string_view(name).substr(0, kLength))) return first;
   std::optional<HgtCorner> found;
-  for (std::size_t at = 1; at + kLength <= name.size(); ++at) {
-    if (is_inside_word(at - 1) || is_inside_word(at + kLength)) continue;
-    const auto corner = corner_in(std::string_view(name).substr(at, kLength));
-    if (corner && found) return std::nullopt;
-    if (corner) found = corner;
+  for (std::sregex_iterator at(name.begin(), name.end(), kPlace); at != std::sregex_iterator(); ++at) {
+    const auto begin = static_cast<std::size_t>(at->position());
+    if (begin != 0 && (is_in_word(begin - 1) || is_in_word(begin + at->str().size()))) continue;
+    const int latitude = std::stoi(at->str(2));
+    const int longitude = std::stoi(at->str(4));
+    if (latitude > 90 || longitude > 180) continue;
+    const HgtCorner corner{at->str(3) == "w" ? -longitude : longitude, at->str(1) == "s" ? -latitude : latitude};
+    if (begin == 0) return corner;
+    if (found) return std::nullopt;
+    found = corner;
   }
   return found;
 }
 
 constexpr std::int64_t kSampleBytes = 2;
-
-std::string file_name(const std::string& path) {
-  const std::size_t slash = path.find_last_of('/');
-  return slash == std::string::npos ? path : path.substr(slash + 1);
-}
 
 struct Size {
   std::int64_t columns = 0;
@@ -95,41 +72,14 @@ std::optional<Size> size_of_tile(std::uint64_t bytes) {
 class HgtSource final : public PlainSource {
  public:
   HgtSource(const std::string& path, const OpenOptions& options) : PlainSource(path, "SRTM HGT") {
-    std::string name = path;
-    if (lower_case(path).ends_with(".zip")) {
-      name = open_member(options.unpacked_bytes);
-    } else {
-      file_.emplace(path, options.unpacked_bytes);
-    }
-    describe(name, file_->size_bytes(), options);
-    read_auxiliary_metadata(info_, 1);
+    describe(options);
+    read_sidecars(info_, 1);
     apply_open_options(info_, options);
   }
 
  private:
-  /// Opens the tile of a zip archive; returns the name that says where it lies.
-  std::string open_member(std::uint64_t unpacked_bytes) {
-    std::vector<ZipEntry> tiles;
-    for (ZipEntry& member : zipped_files(RawFile(info_.path))) {
-      if (lower_case(member.name).ends_with(".hgt")) tiles.push_back(std::move(member));
-    }
-    if (tiles.size() != 1) {
-      throw Error(
-          ErrorCode::kUnsupported,
-          fmt::format("{}: {} .hgt files are in the archive, must be 1; unpack it, a folder of them is one input",
-                      info_.path, tiles.size()));
-    }
-    file_.emplace(info_.path, tiles.front(), unpacked_bytes);
-    const std::optional<HgtCorner> inside = hgt_corner_of(tiles.front().name);
-    const std::optional<HgtCorner> outside = hgt_corner_of(info_.path);
-    if (inside && outside && (inside->latitude != outside->latitude || inside->longitude != outside->longitude)) {
-      info_.warnings.push_back(fmt::format("the archive is called {} and holds {}; the latter says where the tile lies",
-                                           file_name(info_.path), file_name(tiles.front().name)));
-    }
-    return inside ? tiles.front().name : info_.path;
-  }
-
-  void describe(const std::string& name, std::uint64_t bytes, const OpenOptions& options) {
+  void describe(const OpenOptions& options) {
+    const std::uint64_t bytes = file_->size_bytes();
     const std::optional<Size> size = size_of_tile(bytes);
     if (!size) {
       throw Error(
@@ -155,7 +105,7 @@ class HgtSource final : public PlainSource {
     geo.spacing_y = 1.0 / static_cast<double>(size->rows - 1);
     geo.system = wgs84_system();
     geo.system.vertical_datum = "EGM96";
-    if (const std::optional<HgtCorner> corner = hgt_corner_of(name)) {
+    if (const std::optional<HgtCorner> corner = hgt_corner_of(info_.path)) {
       geo.has_origin = true;
       geo.origin_x = corner->longitude;
       geo.origin_y = corner->latitude + 1;
@@ -220,22 +170,13 @@ void check_place(const std::string& path, const RasterSpec& spec) {
                   place.unit == HorizontalUnit::kDegree ? "" : ", not in degrees"));
 }
 
-}  // namespace
-
-bool is_zip_of_hgt(const std::string& path) {
-  if (!lower_case(path).ends_with(".zip")) return false;
-  try {
-    const std::vector<ZipEntry> members = zipped_files(RawFile(path));
-    return std::ranges::count_if(members,
-                                 [](const ZipEntry& member) { return lower_case(member.name).ends_with(".hgt"); }) == 1;
-  } catch (const Error&) {
-    return false;  // is something else, or too damaged to say
-  }
-}
-
 std::unique_ptr<HeightSource> open_hgt(const std::string& path, const OpenOptions& options) {
   return std::make_unique<HgtSource>(path, options);
 }
+
+}  // namespace
+
+const Format kHgtFormat = {.name = "SRTM HGT", .extensions = {".hgt"}, .open = open_hgt, .goes_by_name = true};
 
 std::unique_ptr<RasterEncoder> encode_hgt(OutputFile& out, const RasterSpec& spec) {
   if (spec.sample_type != SampleType::kInt16 || spec.channels != 1) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <tuple>
 #include <vector>
 
 #include "isohf/base/bytes.h"
@@ -38,27 +39,22 @@ void copy_samples(std::size_t size, const std::byte* from, std::size_t from_step
   }
 }
 
-/// A whole number as the float64 that it is; false where it is none.
 template <typename Whole>
-bool widen(std::byte* at, Whole& number) {
-  std::memcpy(&number, at, sizeof number);
-  const auto value = static_cast<double>(number);
+void widen(const std::string& path, const Window& window, std::span<std::byte> samples) {
   // 2^63 and 2^64 are not in the types' ranges, but what their largest numbers round to.
   constexpr double kEnd = std::numeric_limits<Whole>::is_signed ? 0x1p63 : 0x1p64;
-  if (value >= kEnd || static_cast<Whole>(value) != number) return false;
-  std::memcpy(at, &value, sizeof value);
-  return true;
-}
-
-template <typename Whole>
-void widen_all(const std::string& path, const Window& window, std::span<std::byte> samples) {
   for (std::size_t at = 0; at < samples.size(); at += sizeof(Whole)) {
     Whole number{};
-    if (widen(samples.data() + at, number)) continue;
-    const auto index = static_cast<std::int64_t>(at / sizeof(Whole));
-    throw Error(ErrorCode::kUnsupported,
-                fmt::format("{}: sample ({}, {}) is {}, which float64 does not hold; store the samples as float64",
-                            path, window.column + index % window.columns, window.row + index / window.columns, number));
+    std::memcpy(&number, samples.data() + at, sizeof number);
+    const auto value = static_cast<double>(number);
+    if (value >= kEnd || static_cast<Whole>(value) != number) {
+      const auto index = static_cast<std::int64_t>(at / sizeof(Whole));
+      throw Error(
+          ErrorCode::kUnsupported,
+          fmt::format("{}: sample ({}, {}) is {}, which float64 does not hold; store the samples as float64", path,
+                      window.column + index % window.columns, window.row + index / window.columns, number));
+    }
+    std::memcpy(samples.data() + at, &value, sizeof value);
   }
 }
 
@@ -74,7 +70,7 @@ float float_from_vax(std::uint32_t stored) {
 }
 
 void widen_whole_numbers(const std::string& path, bool is_signed, const Window& window, std::span<std::byte> samples) {
-  return is_signed ? widen_all<std::int64_t>(path, window, samples) : widen_all<std::uint64_t>(path, window, samples);
+  return is_signed ? widen<std::int64_t>(path, window, samples) : widen<std::uint64_t>(path, window, samples);
 }
 
 void PlainLayout::take_band(const SourceInfo& info, BandOrder order, std::int64_t band, std::int64_t bands,
@@ -116,25 +112,28 @@ void read_plain_samples(const RawFile& file, const SourceInfo& info, const Plain
   const auto columns = static_cast<std::size_t>(window.columns);
   const auto rows = static_cast<std::size_t>(window.rows);
   const std::size_t run = columns * size;
-  std::vector<std::byte> piece;
   if (across == size && run == down) {  // whole rows lie together in the file as in the window
     file.read(first, samples);
-  } else if (across == size) {
-    for (std::size_t row = 0; row < rows; ++row) file.read(first + row * down, samples.subspan(row * run, run));
-  } else if (down == size) {  // the samples of a column follow each other
-    piece.resize(rows * size);
-    for (std::size_t column = 0; column < columns; ++column) {
-      file.read(first + column * across, piece);
-      copy_samples(size, piece.data(), size, samples.data() + column * size, run, rows);
-    }
   } else {
-    const auto most = static_cast<std::size_t>(std::max<std::uint64_t>(1, kPieceBytes / across));
-    for (std::size_t row = 0; row < rows; ++row) {
-      for (std::size_t done = 0; done < columns; done += most) {
-        const std::size_t count = std::min(most, columns - done);
-        piece.resize((count - 1) * across + size);
-        file.read(first + row * down + done * across, piece);
-        copy_samples(size, piece.data(), across, samples.data() + row * run + done * size, size, count);
+    // Along rows, or along columns where their samples are nearer to each other.
+    const bool by_columns = down < across;
+    const auto [lines, line_step, line_to] =
+        by_columns ? std::tuple(columns, across, size) : std::tuple(rows, down, run);
+    const auto [length, step, to] = by_columns ? std::tuple(rows, down, run) : std::tuple(columns, across, size);
+    const auto most = static_cast<std::size_t>(std::max<std::uint64_t>(1, kPieceBytes / step));
+    std::vector<std::byte> piece;
+    for (std::size_t line = 0; line < lines; ++line) {
+      for (std::size_t at = 0; at < length; at += most) {
+        const std::size_t count = std::min(most, length - at);
+        const std::uint64_t begin = first + line * line_step + at * step;
+        std::byte* const out = samples.data() + line * line_to + at * to;
+        if (step == size && to == size) {
+          file.read(begin, {out, count * size});
+        } else {
+          piece.resize((count - 1) * step + size);
+          file.read(begin, piece);
+          copy_samples(size, piece.data(), step, out, to, count);
+        }
       }
     }
   }

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <charconv>
 
-#include "formats/georeference/files_beside.h"
-#include "formats/io/text.h"
+#include "formats/georeference/sidecars.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
 
 namespace isohf {

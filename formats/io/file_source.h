@@ -18,28 +18,22 @@ namespace isohf {
          bytes == static_cast<std::size_t>(window.columns * window.rows) * size_bytes(info.sample_type);
 }
 
-/// A raster whose samples lie in one file, which may be packed.
+/// A raster whose samples lie in one file.
 class FileSource : public HeightSource {
  public:
   [[nodiscard]] const SourceInfo& info() const final { return info_; }
-  void limit_buffers(std::uint64_t bytes) override { file_->limit_buffers(bytes); }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override { return file_->buffer_bytes(limit); }
 
  protected:
-  /// The file is opened by whoever derives from this.
-  FileSource(std::string path, std::string format) {
-    info_.path = std::move(path);
+  /// Opens the file; whoever derives from this opens another where the samples lie in one.
+  FileSource(const std::string& path, std::string format) : file_(path) {
+    info_.path = path;
     info_.format = std::move(format);
-  }
-  FileSource(const std::string& path, std::string format, const OpenOptions& options)
-      : FileSource(path, std::move(format)) {
-    file_.emplace(path, options.unpacked_bytes);
   }
 
   [[noreturn]] void fail(ErrorCode code, const std::string& what) const { throw Error(code, info_.path + ": " + what); }
 
   SourceInfo info_;
-  std::optional<RawFile> file_;
+  std::optional<RawFile> file_;  ///< never empty
 };
 
 }  // namespace isohf

@@ -5,6 +5,7 @@
 
 #include <cerrno>
 
+#include "formats/io/packed_files.h"
 #include "isohf/base/file.h"
 #include "isohf/error.h"
 
@@ -14,6 +15,7 @@ FileStamp FileStamp::of(const std::string& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) {
     const int error = errno;
+    if (const auto member = error == ENOTDIR ? member_path(path) : std::nullopt) return of(member->archive);
     throw Error(ErrorCode::kIo, {path, error == ENOENT ? "no such file" : reason(error), "", ""});
   }
   return {status.st_dev, status.st_ino, static_cast<std::uint64_t>(status.st_size), status.st_mtim.tv_sec,

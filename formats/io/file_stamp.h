@@ -13,7 +13,7 @@ struct FileStamp {
   std::int64_t changed_s = 0;
   std::int64_t changed_ns = 0;
 
-  /// Throws Error{kIo} naming the path.
+  /// Of an archive where `path` names a member of it (packed_files.h). Throws Error{kIo} naming the path.
   [[nodiscard]] static FileStamp of(const std::string& path);
   friend bool operator==(const FileStamp&, const FileStamp&) = default;
 

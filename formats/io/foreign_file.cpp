@@ -10,8 +10,9 @@
 #include <string_view>
 #include <utility>
 
-#include "formats/georeference/files_beside.h"
-#include "formats/io/text.h"
+#include "formats/georeference/sidecars.h"
+#include "formats/readers.h"
+#include "isohf/base/text/text.h"
 
 namespace isohf {
 namespace {
@@ -19,35 +20,20 @@ namespace {
 using namespace std::string_view_literals;
 
 constexpr const char* kGdal = "gdal_translate {} OUT.tif makes a GeoTIFF of it";
+constexpr const char* kPdal = "PDAL grids it: pdal translate {} OUT.tif --writers.gdal.resolution=1";  // NOLINT
+constexpr const char* kNumpy = R"(np.save("a.npy", np.load("{}")["a"]) saves its array a by itself)";
+constexpr const char* kPmtiles = "pmtiles convert {} OUT.pmtiles makes a PMTiles archive of it";
 constexpr const char* kExport = "isohf export {} OUT.tif makes a raster of it";
-constexpr const char* kUnpack = "unpack it first";
-
-bool has_extension(const std::string& path, std::string_view extension) {
-  return lower_case(path).ends_with(extension);
-}
-
-/// Whether the file of another extension lies beside it.
-bool has_beside(const std::string& path, const char* extension) {
-  return !file_beside(path, std::filesystem::path(path).filename().replace_extension(extension).string()).empty();
-}
-
-/// The file of samples that a header describes; `path` for any other file.
-std::string samples_of(const std::string& path) {
-  for (const auto& [header, samples] : {std::pair(".sgrd", ".sdat"), {".rdc", ".rst"}, {".rsc", ""}}) {
-    if (has_extension(path, header)) return std::filesystem::path(path).replace_extension(samples).string();
-  }
-  return path;
-}
 
 /// Whether text begins with a line of GRASS's r.in.ascii, "north: 4928000".
-bool is_grass_text(const std::string& /*path*/, std::string_view head) {
+bool is_grass_text(std::string_view head) {
   const std::string name = lower_case(trimmed(head.substr(0, head.find(':'))));
   constexpr std::array<std::string_view, 6> kNames = {"north", "south", "east", "west", "rows", "cols"};
   return name.size() < head.size() && std::ranges::find(kNames, name) != kNames.end();
 }
 
 /// Whether text begins a record of type A (USGS, Standards for Digital Elevation Models, part 2): codes in columns of six.
-bool is_usgs_dem(const std::string& /*path*/, std::string_view head) {
+bool is_usgs_dem(std::string_view head) {
   constexpr std::size_t kCodes = 144;
   constexpr std::size_t kColumn = 6;
   constexpr std::pair<int, int> kRanges[] = {{0, 9}, {1, 4}, {-9999, 99}, {-9999, 9999}};
@@ -65,100 +51,109 @@ bool is_usgs_dem(const std::string& /*path*/, std::string_view head) {
   return true;
 }
 
-bool is_graymap(const std::string& /*path*/, std::string_view head) {
+bool is_graymap(std::string_view head) {
   return head.size() > 2 && head.starts_with("P5") &&
          std::string_view(" \t\n\v\f\r#").find(head[2]) != std::string::npos;
 }
 
-bool is_mbtiles(const std::string& path, std::string_view head) {
+/// Whether an SQLite database has the application number of MBTiles.
+bool is_mbtiles_id(std::string_view head) {
   constexpr std::size_t kApplicationAt = 68;
-  return head.starts_with("SQLite format 3") &&
-         (has_extension(path, ".mbtiles") || head.substr(std::min(kApplicationAt, head.size())).starts_with("MPBX"));
+  return head.starts_with("SQLite format 3") && head.substr(std::min(kApplicationAt, head.size())).starts_with("MPBX");
 }
 
-bool is_saga(const std::string& path, std::string_view /*head*/) {
-  return has_extension(path, ".sdat") || has_extension(path, ".sgrd");
+/// Whether text has two bytes a letter, by its byte order mark and some zeros.
+bool is_utf16(std::string_view head) {
+  return (head.starts_with("\xFF\xFE") || head.starts_with("\xFE\xFF")) && head.find('\0') != head.npos;
 }
 
-bool is_idrisi(const std::string& path, std::string_view /*head*/) {
-  return has_extension(path, ".rdc") || (has_extension(path, ".rst") && has_beside(path, ".rdc"));
-}
-
-bool is_roi_pac(const std::string& path, std::string_view /*head*/) {
-  return has_extension(path, ".rsc") || (has_extension(path, ".dem") && has_beside(path, ".dem.rsc"));
-}
-
-/// A raster of another program: by what its files begin with, or by more than that.
-struct Raster {
-  const char* is;
-  std::array<std::string_view, 3> begins;
-  bool (*is_one)(const std::string& path, std::string_view head) = nullptr;
-  const char* help = kGdal;
-};
-
-constexpr Raster kRasters[] = {
-    {"a JPEG 2000 picture", {"\0\0\0\x0CjP  \r\n\x87\n"sv, "\xFF\x4F\xFF\x51"}},
-    {"an ERDAS Imagine raster", {"EHFA_HEADER_TAG"}},
-    {"a Surfer grid", {"DSAA", "DSBB", "DSRB"}},
-    {"a VICAR raster", {"LBLSIZE="}},
-    {"a Terragen terrain", {"TERRAGENTERRAIN "}},
-    {"a portable graymap", {}, is_graymap},
-    {"an MBTiles file", {}, is_mbtiles, "pmtiles convert {} OUT.pmtiles makes a PMTiles archive of it"},
-    {"a SAGA grid", {}, is_saga},
-    {"an IDRISI raster", {}, is_idrisi},
-    {"a ROI_PAC raster", {}, is_roi_pac},
-    {"a GRASS ASCII raster", {}, is_grass_text},
-    {"a USGS DEM", {}, is_usgs_dem},
-};
-
-const Raster* raster_of(const std::string& path, std::string_view head) {
-  for (const Raster& raster : kRasters) {
-    if (raster.is_one != nullptr && raster.is_one(path, head)) return &raster;
-    for (const std::string_view begin : raster.begins) {
-      if (!begin.empty() && head.starts_with(begin)) return &raster;
-    }
-  }
-  return nullptr;
-}
-
-struct Signature {
-  std::string_view bytes;
-  const char* is;
-  const char* help = "";
+/// What marks files of a format; all that is given must hold.
+struct Mark {
+  std::string_view begins = {};  ///< the file's bytes from `at` on
+  std::string_view extension = {};
+  std::string_view beside = {};  ///< extension of a file of the same name
+  bool (*is_one)(std::string_view head) = nullptr;
   std::size_t at = 0;
 };
 
-constexpr Signature kSignatures[] = {
-    {"isohf.json"sv, "an isohf archive", kExport, 30},
-    {"mimetypeapplication/vnd.isohf"sv, "an isohf archive", kExport, 30},
-    {"PK\x03\x04"sv, "a ZIP file", "it is damaged or cut off"},
-    {"\x1f\x8b"sv, "a gzip file", "gunzip it first"},
-    {"BZh"sv, "a bzip2 file", kUnpack},
-    {"\xfd"
-     "7zXZ"sv,
-     "an xz file", kUnpack},
-    {"\x28\xb5\x2f\xfd"sv, "a Zstandard file", kUnpack},
-    {"7z\xbc\xaf"sv, "a 7-Zip file", kUnpack},
-    {"Rar!"sv, "a RAR file", kUnpack},
-    {"%PDF"sv, "a PDF document"},
-    {"LASF"sv, "a LAS point cloud", "PDAL grids it: pdal translate {} OUT.tif --writers.gdal.resolution=1"},  // NOLINT
-    {"ply\n"sv, "a PLY mesh"},
-    {"glTF"sv, "a glTF model"},
-    {"\x0e\x03\x13\x01"sv, "an HDF4 file", kGdal},
-    {"GRIB"sv, "a GRIB file", kGdal},
-    {"NITF"sv, "a NITF raster", kGdal},
-    {"msid"sv, "a MrSID picture", kGdal},
-    {"SQLite format 3"sv, "an SQLite database, as a GeoPackage is one", kGdal},
-    {"\x00\x00\x27\x0a"sv, "a shapefile, which holds points or outlines", "gdal_grid makes a raster of points"},
-    {"\xff\xd8\xff"sv, "a JPEG picture"},
-    {"GIF8"sv, "a GIF picture"},
-    {"RIFF"sv, "a RIFF file: a WebP picture, sound or film"},
-    {"\x7f"
-     "ELF"sv,
-     "a program"},
-    {"<?xml"sv, "XML text"},
-    {"{"sv, "JSON text"},
+struct Row {
+  const char* is;
+  Mark mark;
+  const char* help = kGdal;       ///< with {} for the file's name
+  const char* samples = nullptr;  ///< extension of the file to convert, if another
 };
+
+/// Rasters that another program converts: they are recognised before isohf's own readers try.
+constexpr Row kConverted[] = {
+    {"a JPEG 2000 picture", {"\0\0\0\x0CjP  \r\n\x87\n"sv}},
+    {"a JPEG 2000 picture", {"\xFF\x4F\xFF\x51"}},
+    {"an ERDAS Imagine raster", {"EHFA_HEADER_TAG"}},
+    {"a Surfer grid", {"DSAA"}},
+    {"a Surfer grid", {"DSBB"}},
+    {"a Surfer grid", {"DSRB"}},
+    {"a VICAR raster", {"LBLSIZE="}},
+    {"a Terragen terrain", {"TERRAGENTERRAIN "}},
+    {"a PCRaster map", {"RUU CROSS SYSTEM MAP FORMAT"}},
+    {"an ER Mapper raster", {"DatasetHeader Begin"}},
+    {"an Arc/Info grid", {.extension = ".adf"}},
+    {"a BAG bathymetry grid", {"\x89HDF\r\n\x1a\n", ".bag"}},
+    {"a GeoPackage", {"SQLite format 3", ".gpkg"}},
+    {"an MBTiles file", {"SQLite format 3", ".mbtiles"}, kPmtiles},
+    {"an MBTiles file", {.is_one = is_mbtiles_id}, kPmtiles},
+    {"an isohf archive", {"PK\x03\x04", ".isohf"}, kExport},
+    {"an isohf archive", {.begins = "isohf.json", .at = 30}, kExport},
+    {"an isohf archive", {.begins = "mimetypeapplication/vnd.isohf", .at = 30}, kExport},
+    {"a NumPy archive", {"PK", ".npz"}, kNumpy},
+    {"a portable graymap", {.is_one = is_graymap}},
+    {"a SAGA grid", {.extension = ".sdat"}},
+    {"a SAGA grid", {.extension = ".sgrd"}, kGdal, ".sdat"},
+    {"an IDRISI raster", {.extension = ".rst", .beside = ".rdc"}},
+    {"an IDRISI raster", {.extension = ".rdc"}, kGdal, ".rst"},
+    {"a ROI_PAC raster", {.extension = ".dem", .beside = ".dem.rsc"}},
+    {"a ROI_PAC raster", {.extension = ".rsc"}, kGdal, ""},
+    {"a GRASS ASCII raster", {.is_one = is_grass_text}},
+    {"a USGS DEM", {.is_one = is_usgs_dem}},
+};
+
+/// What no reader of isohf's takes.
+constexpr Row kOthers[] = {
+    {"a gzip file", {"\x1f\x8b"}, "a name that ends in .gz has it unpacked"},
+    {"a bzip2 file", {"BZh"}, "a name that ends in .bz2 has it unpacked"},
+    {"an xz file", {"\xfd\x37zXZ"}, "a name that ends in .xz has it unpacked"},
+    {"a Zstandard file", {"\x28\xb5\x2f\xfd"}, "a name that ends in .zst has it unpacked"},
+    {"a RAR file", {"Rar!"}, "unpack it first"},
+    {"a LAS point cloud", {"LASF"}, kPdal},
+    {"an E57 point cloud", {"ASTM-E57"}, kPdal},
+    {"an HDF4 file", {"\x0e\x03\x13\x01"}},
+    {"a GRIB file", {"GRIB"}},
+    {"a NITF raster", {"NITF"}},
+    {"a MrSID picture", {"msid"}},
+    {"an SQLite database, as a GeoPackage is one", {"SQLite format 3"}},
+    {"a shapefile, which holds points or outlines", {"\0\0\x27\x0a"sv}, "gdal_grid makes a raster of points"},
+    {"text in UTF-16", {.is_one = is_utf16}, "iconv -f UTF-16 -t UTF-8 {} -o OUT makes UTF-8 of it"},
+    {"a PDF document", {"%PDF"}, ""},
+    {"a PLY mesh", {"ply\n"}, ""},
+    {"a glTF model", {"glTF"}, ""},
+    {"a JPEG picture", {"\xff\xd8\xff"}, ""},
+    {"a GIF picture", {"GIF8"}, ""},
+    {"a RIFF file: a WebP picture, sound or film", {"RIFF"}, ""},
+    {"a program", {"\177ELF"}, ""},
+    {"XML text", {"<?xml"}, ""},
+    {"JSON text", {"{"}, ""},
+};
+
+const Row* find_row(std::span<const Row> rows, const std::string& path, std::string_view head) {
+  const auto is_of = [&](const Row& row) {
+    const Mark& mark = row.mark;
+    if (!mark.extension.empty() && !lower_case(path).ends_with(mark.extension)) return false;
+    if (mark.at > head.size() || !head.substr(mark.at).starts_with(mark.begins)) return false;
+    if (mark.is_one != nullptr && !mark.is_one(head)) return false;
+    const std::string name = std::filesystem::path(path).filename().replace_extension(mark.beside).string();
+    return mark.beside.empty() || !file_beside(path, name).empty();
+  };
+  const auto found = std::ranges::find_if(rows, is_of);
+  return found == rows.end() ? nullptr : &*found;
+}
 
 bool is_text(std::string_view head) {
   return !head.empty() && std::all_of(head.begin(), head.end(), [](char c) {
@@ -170,25 +165,23 @@ bool is_text(std::string_view head) {
 }  // namespace
 
 bool is_foreign_raster(const std::string& path, std::span<const std::byte> head) {
-  return raster_of(path, text_of(head)) != nullptr;
+  return find_row(kConverted, path, text_of(head)) != nullptr;
 }
 
 ForeignFile foreign_file(const std::string& path) {
-  constexpr std::size_t kHeadBytes = 512;
-  std::string head(kHeadBytes, '\0');
+  std::string head(512, '\0');
   std::ifstream file(path, std::ios::binary);
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(file.gcount()));
-  if (const Raster* const raster = raster_of(path, head)) {
-    return {raster->is, fmt::format(fmt::runtime(raster->help), samples_of(path))};
+  const Row* row = find_row(kConverted, path, head);
+  if (row == nullptr) row = find_row(kOthers, path, head);
+  if (row == nullptr) return {is_text(head) ? "text" : "", ""};
+  if (row->mark.begins.starts_with("\0\0\0\x0CjP"sv)) {
+    if (std::string help = jpeg2000_help(path); !help.empty()) return {row->is, std::move(help)};
   }
-  for (const Signature& signature : kSignatures) {
-    if (head.size() < signature.at || !std::string_view(head).substr(signature.at).starts_with(signature.bytes))
-      continue;
-    return {signature.is, fmt::format(fmt::runtime(signature.help), path)};
-  }
-  if (is_text(head)) return {"text", ""};
-  return {};
+  std::filesystem::path converted = path;
+  if (row->samples != nullptr) converted.replace_extension(row->samples);
+  return {row->is, fmt::format(fmt::runtime(row->help), converted.string())};
 }
 
 }  // namespace isohf

@@ -8,8 +8,9 @@
 #include <fstream>
 #include <iterator>
 
-#include "formats/io/text.h"
+#include "formats/io/packed_files.h"
 #include "formats/registry.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -80,7 +81,7 @@ void find_one(const std::string& input, const Wanted& wanted, std::vector<InputF
     return wanted.recursive ? find_in_folder<fs::recursive_directory_iterator>(input, wanted, found)
                             : find_in_folder<fs::directory_iterator>(input, wanted, found);
   }
-  if (fs::exists(status)) {
+  if (fs::exists(status) || member_path(input)) {
     found.push_back({input, ""});
   } else if (input == "-") {
     refuse(input, "standard input cannot be read twice, as a conversion needs; save it in a file");
@@ -155,8 +156,8 @@ std::vector<std::string> list_files(const std::vector<std::string>& inputs, bool
 
 std::string bare_name(const std::string& path) {
   const fs::path name = fs::path(path).filename();
-  const std::string ending = lower_case(name.extension().string());
-  const bool is_packed = (ending == ".gz" || ending == ".zip") && is_raster_in_folder(name.stem().string());
+  const bool is_packed =
+      (unpacked_name(path) != path || has_archive_name(path)) && is_raster_in_folder(name.stem().string());
   return (is_packed ? name.stem().stem() : name.stem()).string();
 }
 

@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/io/text.h"
-#include "isohf/base/number_text.h"
 #include "isohf/base/output_file.h"
+#include "isohf/base/text/number_text.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
 #include "isohf/projection/length_unit.h"
 
@@ -42,7 +42,8 @@ LengthValue parse_length(const std::string& text) {
   const char* const end = text.data() + text.size();
   const auto [rest, error] = std::from_chars(text.data() + (text.starts_with('+') ? 1 : 0), end, length.value);
   const std::string_view unit_name(std::find_if(rest, end, [](char c) { return c != ' '; }), end);
-  const auto unit = unit_name.empty() ? std::nullopt : linear_unit(unit_name);
+  const bool is_name = !unit_name.empty() && unit_name.find_first_of("0123456789") == std::string_view::npos;
+  const auto unit = is_name ? linear_unit(unit_name) : std::nullopt;
   if (error != std::errc() || !(unit_name.empty() || unit) || !std::isfinite(length.value) || length.value <= 0.0) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("found '{}', must be a number greater than 0, alone or with a unit: mm, cm, m, km, ft, "

@@ -7,8 +7,10 @@
 #include <charconv>
 #include <cstring>
 #include <limits>
+#include <optional>
 
-#include "formats/io/text.h"
+#include "isohf/base/text/number_text.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -16,30 +18,40 @@ namespace {
 
 constexpr std::size_t kBufferBytes = std::size_t{1} << 18U;
 
-/// What C libraries print for numbers that are none; the ones with # are of old Windows.
+/// What old Windows prints for numbers that are none; from_chars reads the other spellings.
 bool read_special(std::string_view word, double& value) {
-  const bool negative = !word.empty() && word.front() == '-';
-  if (!word.empty() && (word.front() == '-' || word.front() == '+')) word.remove_prefix(1);
-  const std::string text = lower_case(word.substr(0, 16));
-  const auto is_any = [&](std::initializer_list<std::string_view> spellings) {
-    return std::find(spellings.begin(), spellings.end(), text) != spellings.end();
-  };
-  if (is_any({"nan", "nan(ind)", "nan(snan)", "1.#qnan", "1.#snan", "1.#ind", "1.#qnan0", "1.#ind00"})) {
-    value = std::numeric_limits<double>::quiet_NaN();
-    return true;
-  }
-  if (is_any({"inf", "infinity", "1.#inf", "1.#inf00"})) {
-    value = negative ? -std::numeric_limits<double>::infinity() : std::numeric_limits<double>::infinity();
-    return true;
-  }
-  return false;
+  const bool is_negative = word.starts_with('-');
+  if (is_negative || word.starts_with('+')) word.remove_prefix(1);
+  std::string text = lower_case(word.substr(0, 16));
+  if (text.starts_with("1,")) text[1] = '.';
+  constexpr std::array<std::string_view, 5> kNan = {"1.#qnan", "1.#snan", "1.#ind", "1.#qnan0", "1.#ind00"};
+  const bool is_infinite = text == "1.#inf" || text == "1.#inf00";
+  if (!is_infinite && std::ranges::find(kNan, text) == kNan.end()) return false;
+  value = is_infinite ? std::numeric_limits<double>::infinity() : std::numeric_limits<double>::quiet_NaN();
+  if (is_negative) value = -value;
+  return true;
 }
 
-/// Whether a number that no double holds is too small for one, not too large.
+/// Whether a number with a point that no double holds is too small for one, not too large.
 bool is_tiny(std::string_view number) {
   const std::size_t exponent = number.find_first_of("eE");
   if (exponent == std::string_view::npos) return number.find('.') < 300;
   return exponent < 60 && number[exponent + 1] == '-';
+}
+
+/// A number with a decimal comma or Fortran's exponent (1.0D+03), or one that is too small for a double.
+bool read_odd_number(std::string_view word, double& value) {
+  std::array<char, 512> text;  // NOLINT(cppcoreguidelines-pro-type-member-init): costs time
+  if (word.size() > text.size() || std::ranges::count(word, ',') > 1 || word.ends_with(',')) return false;
+  if (word.find(',') != word.npos && word.find('.') != word.npos) return false;
+  std::ranges::transform(word, text.begin(), [](char c) { return c == ',' ? '.' : c == 'D' || c == 'd' ? 'E' : c; });
+  const char* const begin = text.data() + (word.starts_with('+') ? 1 : 0);
+  const char* const end = text.data() + word.size();
+  const auto [at, error] = std::from_chars(begin, end, value);
+  if (at != end || error == std::errc::invalid_argument) return false;
+  if (error == std::errc{}) return true;
+  value = 0.0;
+  return is_tiny({begin, end});
 }
 
 }  // namespace
@@ -68,10 +80,10 @@ bool TextTokens::finish_odd_word(const char* begin, std::string_view& word) {
 
 bool TextTokens::fill(const char* keep) {
   const auto kept = static_cast<std::size_t>(end_ - keep);
-  if (kept > kLongestWord) {
+  if (kept > kLongest) {
     throw Error(ErrorCode::kCorrupt,
-                fmt::format("{}: line {}: there are more than {} bytes without a blank, which is no number",
-                            file_.path(), line_, kLongestWord));
+                fmt::format("{}: line {}: there are more than {} bytes without a blank or line end", file_.path(),
+                            line_, kLongest));
   }
   const std::uint64_t offset = base_ + static_cast<std::uint64_t>(end_ - buffer_.data());
   base_ = offset - kept;
@@ -85,30 +97,9 @@ bool TextTokens::fill(const char* keep) {
 }
 
 bool read_decimal(std::string_view word, double& value) {
-  std::string_view digits = word;
-  if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
-  std::array<char, TextTokens::kLongestWord> with_point{};
-  const std::size_t comma = digits.find(',');
-  if (comma != std::string_view::npos) {
-    if (digits.size() > with_point.size() || digits.find('.') != std::string_view::npos) return false;
-    std::copy(digits.begin(), digits.end(), with_point.begin());
-    with_point[comma] = '.';
-    digits = {with_point.data(), digits.size()};
-  }
-  const std::size_t first = !digits.empty() && digits.front() == '-' ? 1 : 0;
-  const bool numeric =
-      digits.size() > first && (digits[first] == '.' || (digits[first] >= '0' && digits[first] <= '9'));
-  if (numeric) {
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (end == digits.data() + digits.size()) {
-      if (error == std::errc::result_out_of_range && is_tiny(digits)) {
-        value = 0.0;
-        return true;
-      }
-      return error == std::errc{};
-    }
-  }
-  return read_special(word, value);
+  const auto number = word.find(',') == word.npos ? number_from(word) : std::nullopt;
+  if (number) value = *number;
+  return number || read_odd_number(word, value) || read_special(word, value);
 }
 
 }  // namespace isohf

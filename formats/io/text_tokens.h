@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -7,6 +9,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "formats/io/raw_file.h"
@@ -14,7 +17,12 @@
 
 namespace isohf {
 
-/// Reads the words of a text file one after the other, whatever blanks and line ends lie between them; holds 256 KiB.
+/// A text without UTF-8's byte order mark, which spreadsheets and PowerShell write.
+[[nodiscard]] inline std::string_view without_byte_order_mark(std::string_view text) {
+  return text.starts_with("\xEF\xBB\xBF") ? text.substr(3) : text;
+}
+
+/// Reads a text file by words, whatever blanks and line ends are between them, or by lines; holds 256 KiB.
 class TextTokens {
  public:
   /// `file` must outlive this.
@@ -24,7 +32,7 @@ class TextTokens {
   void seek(std::uint64_t offset_bytes);
 
   /// The next word, valid until the next call; false at the end of the file.
-  /// Throws Error: kIo; kCorrupt for a word of more than kLongestWord bytes.
+  /// Throws Error: kIo; kCorrupt for a word of more than kLongest bytes.
   bool next(std::string_view& word) {
     for (;;) {
       while (is_blank(*at_)) line_ += *at_++ == '\n' ? 1U : 0U;
@@ -44,13 +52,26 @@ class TextTokens {
     }
   }
 
+  /// The next line without its end; as next().
+  bool next_line(std::string_view& line) {
+    const void* end = nullptr;
+    do {
+      end = std::memchr(at_, '\n', static_cast<std::size_t>(end_ - at_));
+    } while (end == nullptr && fill(at_));
+    const char* const stop = end == nullptr ? end_ : static_cast<const char*>(end);
+    line = {at_, static_cast<std::size_t>(stop - at_)};
+    line_ += end != nullptr ? 1U : 0U;
+    at_ = std::min(stop + 1, end_);
+    return end != nullptr || !line.empty();
+  }
+
   /// Of the last word.
   [[nodiscard]] std::uint64_t line() const { return line_; }
   [[nodiscard]] std::uint64_t offset_of(std::string_view word) const {
     return base_ + static_cast<std::uint64_t>(word.data() - buffer_.data());
   }
 
-  static constexpr std::size_t kLongestWord = 1024;
+  static constexpr std::size_t kLongest = 4096;
 
  private:
   static bool is_blank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
@@ -66,9 +87,20 @@ class TextTokens {
   std::uint64_t line_ = 1;
 };
 
-/// The number that a word of a grid's text says, with a decimal point or one decimal comma, or one of the spellings of
-/// NaN and infinity that programs print; false for any other word and for numbers beyond the range of a double.
+/// Reads the number that a word of a text is, with a decimal point or one decimal comma, an exponent behind E or Fortran's
+/// D, or one of the spellings of NaN and infinity that programs print. False for any other word and for numbers beyond
+/// the range of a double.
 [[nodiscard]] bool read_decimal(std::string_view word, double& value);
+
+/// Reads a number without an exponent that is whole and fits 32 bits: "12", "+12.", "12,0", not "12,", part of a list.
+[[nodiscard]] inline bool read_whole(std::string_view word, std::int32_t& value) {
+  const char* const end = word.data() + word.size();
+  const auto [at, error] = std::from_chars(word.data() + (word.starts_with('+') ? 1 : 0), end, value);
+  if (error != std::errc{}) return false;
+  const std::string_view rest(at, end);
+  if (rest.empty() || rest == ".") return true;
+  return rest.size() > 1 && (rest[0] == '.' || rest[0] == ',') && rest.find_first_not_of('0', 1) == rest.npos;
+}
 
 /// The rows of numbers in a text: where each begins, or every second, fourth, ... once there are many (512 KiB at
 /// most), and reading on from there.

@@ -19,162 +19,53 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-/// A stored sample as a number, for loops over one type.
-template <typename T>
-double load(const std::byte* at) {
-  return static_cast<double>(number_of(stored_at<T>(at)));
-}
+constexpr double kLowestInt32 = std::numeric_limits<std::int32_t>::lowest();
 
 bool is_void(const SampleKind& kind, double number) {
   if (!std::isfinite(number) || number < kind.valid_min || number > kind.valid_max) return true;
-  return std::find(kind.void_values.begin(), kind.void_values.end(), number) != kind.void_values.end();
+  return std::ranges::find(kind.void_values, number) != kind.void_values.end();
 }
 
-struct Limits {
-  double lowest = 0.0;
-  double highest = 0.0;
-};
-
-/// Of an integer type; both are 0 for floating ones.
-Limits limits_of(SampleType type) {
-  if (is_floating(type)) return {};
-  const auto [lowest, highest] = sample_range(type);
-  return {lowest, highest};
+/// The only void of integers, if they have just one.
+std::optional<double> only_void(const SampleKind& kind) {
+  if (is_floating(kind.type) || kind.void_values.size() != 1 || std::isfinite(kind.valid_max)) return std::nullopt;
+  const double value = kind.void_values.front();
+  const auto [lowest, highest] = sample_range(kind.type);
+  const bool is_bound = value == lowest && kind.valid_min == value + 1.0;
+  const bool is_alone = kind.valid_min <= lowest || is_bound;
+  return is_alone && value >= lowest && value <= highest ? std::optional(value) : std::nullopt;
 }
 
-/// Whether values are void that are not listed.
-bool is_bounded(const SampleKind& kind) {
-  if (std::isfinite(kind.valid_max)) return true;
-  const bool is_listed = kind.void_values.size() == 1 && !is_floating(kind.type) &&
-                         kind.void_values.front() == limits_of(kind.type).lowest;
-  return std::isfinite(kind.valid_min) && !(is_listed && kind.valid_min == kind.void_values.front() + 1.0);
+bool has_voids(const SampleKind& kind) {
+  return is_floating(kind.type) || !kind.void_values.empty() || std::isfinite(kind.valid_min) ||
+         std::isfinite(kind.valid_max);
 }
 
-/// Whether some sample of this kind could be an elevation of that raw number.
-bool may_hold_elevation(const SampleKind& kind, double number) {
-  if (!is_floating(kind.type) && (number < limits_of(kind.type).lowest || number > limits_of(kind.type).highest))
-    return false;
-  return !is_void(kind, number);
-}
-
-/// The smallest type that holds all integers of [low, high]; they are those of up to 32 bits.
-SampleType integer_for(double low, double high) {
-  for (const SampleType type : {SampleType::kUint8, SampleType::kInt8, SampleType::kUint16, SampleType::kInt16,
-                                SampleType::kUint32, SampleType::kInt32}) {
-    if (low >= limits_of(type).lowest && high <= limits_of(type).highest) return type;
-  }
-  return SampleType::kFloat64;
-}
-
-bool has_24_bits(SampleType type) {
-  return type != SampleType::kUint32 && type != SampleType::kInt32 && type != SampleType::kFloat64;
-}
-
-/// The smallest type that holds every raw sample of all kinds exactly.
-SampleType common_type(const std::vector<SampleKind>& kinds, bool floating) {
-  bool same = true;
-  bool narrow = true;
-  double low = 0.0;
-  double high = 0.0;
-  for (const SampleKind& kind : kinds) {
-    same = same && kind.type == kinds.front().type;
-    narrow = narrow && has_24_bits(kind.type);
-    floating = floating || is_floating(kind.type);
-    low = std::min(low, limits_of(kind.type).lowest);
-    high = std::max(high, limits_of(kind.type).highest);
-  }
-  // float16 holds what it is given, but not what is computed between its numbers.
-  if (same && (!floating || (is_floating(kinds.front().type) && kinds.front().type != SampleType::kFloat16))) {
-    return kinds.front().type;
-  }
-  if (floating) return narrow ? SampleType::kFloat32 : SampleType::kFloat64;
-  return integer_for(low, high);
-}
-
-SampleType wider(SampleType type) {
-  switch (type) {
-    case SampleType::kUint8:
-    case SampleType::kInt8:
-      return SampleType::kInt16;
-    case SampleType::kUint16:
-    case SampleType::kInt16:
-      return SampleType::kInt32;
-    default:
-      return SampleType::kFloat64;
-  }
-}
-
-/// A raw number that no member of an integer type has as an elevation; nullopt where none is found.
-std::optional<double> common_void(const std::vector<SampleKind>& kinds, SampleType type) {
-  std::vector<double> candidates;
-  for (const SampleKind& kind : kinds) {
-    candidates.insert(candidates.end(), kind.void_values.begin(), kind.void_values.end());
-  }
-  std::sort(candidates.begin(), candidates.end());
-  candidates.push_back(limits_of(type).lowest);
-  for (const double candidate : candidates) {
-    if (!void_value_as_stored(type, candidate)) continue;
-    const auto is_taken = [&](const SampleKind& kind) { return may_hold_elevation(kind, candidate); };
-    if (std::none_of(kinds.begin(), kinds.end(), is_taken)) return candidate;
-  }
-  return std::nullopt;
-}
-
-/// The raw number to fill gaps with in a kind that stays as it is; nullopt where it has no void.
-std::optional<double> gap_of(const SampleKind& kind) {
+/// A raw number that is void in a kind; nullopt if it has none.
+std::optional<double> void_of(const SampleKind& kind) {
   for (const double value : kind.void_values) {
     if (std::isfinite(value)) return value;
   }
   if (is_floating(kind.type)) return kNaN;
-  if (kind.valid_min > limits_of(kind.type).lowest) return limits_of(kind.type).lowest;
-  if (kind.valid_max < limits_of(kind.type).highest) return limits_of(kind.type).highest;
+  const auto [lowest, highest] = sample_range(kind.type);
+  if (kind.valid_min > lowest) return lowest;
+  if (kind.valid_max < highest) return highest;
   return std::nullopt;
 }
 
-SampleKind plain_kind(SampleType type, const SampleKind& scaled) {
-  return {type, {}, -kInfinity, kInfinity, scaled.z_scale, scaled.z_offset};
-}
-
-/// Integers without a void to spare: a larger type has one.
-MosaicSamples widened(const SampleKind& kind) {
-  MosaicSamples samples;
-  samples.kind = plain_kind(wider(kind.type), kind);
-  const bool floating = is_floating(samples.kind.type);
-  const double gap = floating ? kNaN : limits_of(samples.kind.type).lowest;
-  if (!floating) {
-    samples.kind.void_values = {gap};
-    samples.kind.valid_min = gap + 1.0;  // which tells that no file means it
+/// The smallest of int32, float32 and float64 that holds every raw sample of all kinds exactly, and another number.
+SampleType common_type(const std::vector<SampleKind>& kinds, bool floating) {
+  bool narrow = true;  // 24 bits hold all
+  bool has_room = true;
+  for (const SampleKind& kind : kinds) {
+    floating = floating || is_floating(kind.type);
+    narrow = narrow && kind.type != SampleType::kUint32 && kind.type != SampleType::kInt32 &&
+             kind.type != SampleType::kFloat64;
+    has_room = has_room && kind.type != SampleType::kUint32 &&
+               (kind.type != SampleType::kInt32 || is_void(kind, kLowestInt32));
   }
-  samples.gap = stored_sample(samples.kind.type, gap);
-  samples.notes.push_back(
-      fmt::format("{} has no number to spare for voids in all files; samples become {} (`void_values` V gives them "
-                  "one)",
-                  to_string(kind.type), to_string(samples.kind.type)));
-  return samples;
-}
-
-template <typename T>
-void lay_integers_over(const T* __restrict upper, T* __restrict lower, std::size_t count, T void_value) {
-  for (std::size_t i = 0; i < count; ++i) {
-    const T above = upper[i];
-    lower[i] = above != void_value || lower[i] == void_value ? above : lower[i];
-  }
-}
-
-template <typename T>
-void lay_one_void_over(const std::byte* upper, std::byte* lower, std::size_t count, double void_value) {
-  // Through arrays of the type's own alignment.
-  constexpr std::size_t kAtOnce = 1024;
-  T above[kAtOnce];
-  T below[kAtOnce];
-  for (std::size_t from = 0; from < count; from += kAtOnce) {
-    const std::size_t part = std::min(kAtOnce, count - from);
-    std::memcpy(above, upper + from * sizeof(T), part * sizeof(T));
-    std::memcpy(below, lower + from * sizeof(T), part * sizeof(T));
-    lay_integers_over(above, below, part, static_cast<T>(void_value));
-    std::memcpy(lower + from * sizeof(T), below, part * sizeof(T));
-  }
+  if (floating) return narrow ? SampleType::kFloat32 : SampleType::kFloat64;
+  return has_room ? SampleType::kInt32 : SampleType::kFloat64;
 }
 
 }  // namespace
@@ -184,49 +75,62 @@ SampleKind SampleKind::of(const SourceInfo& info) {
 }
 
 MosaicSamples choose_mosaic_samples(const std::vector<SampleKind>& kinds, bool gaps, const char* why_interpolated) {
-  const bool interpolated = why_interpolated != nullptr;
   ISOHF_ASSERT(!kinds.empty());
   const SampleKind& first = kinds.front();
-  const auto all = [&](auto holds) { return std::all_of(kinds.begin(), kinds.end(), holds); };
+  const auto all = [&](auto holds) { return std::ranges::all_of(kinds, holds); };
+  const bool is_one_kind = all([&](const SampleKind& kind) { return kind == first; });
   MosaicSamples samples;
-  if (!all([&](const SampleKind& kind) { return kind.z_scale == first.z_scale && kind.z_offset == first.z_offset; })) {
-    samples.kind = plain_kind(SampleType::kFloat64, {});
-    samples.gap = stored_sample(samples.kind.type, kNaN);
-    samples.notes.emplace_back("the files differ in scale or offset; samples become elevations, float64");
-    return samples;
-  }
-  if (!interpolated && all([&](const SampleKind& kind) { return kind == first; })) {
-    const std::optional<double> gap = gap_of(first);
-    if (!gap && gaps) return widened(first);
+  if (is_one_kind && why_interpolated == nullptr && (has_voids(first) || !gaps)) {
     samples.kind = first;
-    samples.gap = stored_sample(first.type, gap.value_or(0.0));
+    samples.gap = stored_sample(first.type, void_of(first).value_or(0.0));
     return samples;
   }
-  samples.kind = plain_kind(common_type(kinds, interpolated), first);
-  if (is_floating(samples.kind.type)) {
-    samples.gap = stored_sample(samples.kind.type, kNaN);
+  SampleKind& kind = samples.kind;
+  kind = {SampleType::kFloat64, {}, -kInfinity, kInfinity, first.z_scale, first.z_offset};
+  const bool is_one_type = all([&](const SampleKind& other) { return other.type == first.type; });
+  const bool is_one_scale =
+      all([&](const SampleKind& other) { return other.z_scale == first.z_scale && other.z_offset == first.z_offset; });
+  // Integers of one type may have a void in common.
+  const auto shared = std::ranges::find_if(first.void_values, [&](double value) {
+    return void_value_as_stored(first.type, value) && all([&](const auto& other) { return is_void(other, value); });
+  });
+  if (is_one_type && is_one_scale && why_interpolated == nullptr && !is_floating(first.type) &&
+      shared != first.void_values.end()) {
+    kind.type = first.type;
+    kind.void_values = {*shared};
+    samples.gap = stored_sample(kind.type, *shared);
+    return samples;
+  }
+  if (!is_one_scale) {
+    kind.z_scale = 1.0;
+    kind.z_offset = 0.0;
+    samples.notes.emplace_back("the files differ in scale or offset; samples become elevations, float64");
   } else {
-    const bool has_voids =
-        gaps || !all([](const SampleKind& kind) { return kind.void_values.empty() && !is_bounded(kind); });
-    const std::optional<double> value = common_void(kinds, samples.kind.type);
-    if (has_voids && !value) return widened(samples.kind);
-    if (has_voids) samples.kind.void_values = {*value};
-    samples.gap = stored_sample(samples.kind.type, has_voids ? *value : 0.0);
+    kind.type = common_type(kinds, why_interpolated != nullptr);
+    const char* const why = why_interpolated != nullptr ? why_interpolated
+                            : is_one_type               ? "the files differ in nodata"
+                                                        : "the files differ in sample type";
+    if (is_one_kind && why_interpolated == nullptr) {
+      samples.notes.push_back(
+          fmt::format("{} has no number to spare for voids; samples become {} (`void_values` V gives them one)",
+                      to_string(first.type), to_string(kind.type)));
+    } else if (!is_one_type || kind.type != first.type) {
+      samples.notes.push_back(fmt::format("{}; samples become {}", why, to_string(kind.type)));
+    }
   }
-  if (!all([&](const SampleKind& kind) { return kind.type == samples.kind.type; })) {
-    samples.notes.push_back(fmt::format("{}; samples become {}",
-                                        interpolated ? why_interpolated : "the files differ in sample type",
-                                        to_string(samples.kind.type)));
+  if (!is_floating(kind.type)) {
+    kind.void_values = {kLowestInt32};
+    kind.valid_min = kLowestInt32 + 1.0;  // no file means it
   }
+  samples.gap = stored_sample(kind.type, is_floating(kind.type) ? kNaN : kLowestInt32);
   return samples;
 }
 
 void fill_with(std::span<const std::byte> sample, std::span<std::byte> out) {
   if (out.empty()) return;
   std::memcpy(out.data(), sample.data(), sample.size());
-  for (std::size_t filled = sample.size(); filled < out.size(); filled *= 2) {
+  for (std::size_t filled = sample.size(); filled < out.size(); filled *= 2)
     std::memcpy(out.data() + filled, out.data(), std::min(filled, out.size() - filled));
-  }
 }
 
 void convert_samples(const SampleKind& from, std::span<const std::byte> raw, const MosaicSamples& to,
@@ -239,55 +143,45 @@ void convert_samples(const SampleKind& from, std::span<const std::byte> raw, con
   const std::size_t to_bytes = size_bytes(to.kind.type);
   const std::size_t count = raw.size() / from_bytes;
   ISOHF_ASSERT(out.size() == count * to_bytes);
+  const double gap = load_sample(to.kind.type)(to.gap.data());
   const bool scales = from.z_scale != to.kind.z_scale || from.z_offset != to.kind.z_offset;
   constexpr std::size_t kAtOnce = 1024;
   double numbers[kAtOnce];
   for (std::size_t at = 0; at < count; at += kAtOnce) {
-    const std::size_t part = std::min(kAtOnce, count - at);
-    numbers_from_samples(from, raw.subspan(at * from_bytes, part * from_bytes), {numbers, part});
-    if (scales) {
-      for (std::size_t i = 0; i < part; ++i) numbers[i] = numbers[i] * from.z_scale + from.z_offset;
+    const std::span part(numbers, std::min(kAtOnce, count - at));
+    numbers_from_samples(from, raw.subspan(at * from_bytes, part.size() * from_bytes), part);
+    for (double& number : part) {
+      if (scales) number = number * from.z_scale + from.z_offset;
+      if (std::isnan(number)) number = gap;
     }
-    std::byte* const target = out.data() + at * to_bytes;
-    if (is_floating(to.kind.type)) {
-      samples_from_numbers(to.kind.type, {numbers, part}, {target, part * to_bytes});
-      continue;
-    }
-    with_stored_type(to.kind.type, [&](auto zero) {
-      using T = decltype(zero);
-      if constexpr (std::is_integral_v<T>) {
-        const T gap = stored_at<T>(to.gap.data());
-        for (std::size_t i = 0; i < part; ++i) {
-          const T value = std::isnan(numbers[i]) ? gap : static_cast<T>(numbers[i]);
-          std::memcpy(target + i * sizeof(T), &value, sizeof(T));
-        }
-      }
-    });
+    samples_from_numbers(to.kind.type, part, out.subspan(at * to_bytes, part.size() * to_bytes));
   }
 }
 
 void lay_over(const SampleKind& kind, std::span<const std::byte> upper, std::span<std::byte> lower) {
   ISOHF_ASSERT(upper.size() == lower.size());
-  const std::size_t count = upper.size() / size_bytes(kind.type);
-  const bool integers = !is_floating(kind.type);
-  if (integers && kind.void_values.empty() && !is_bounded(kind)) {
+  if (!has_voids(kind)) {
     std::memcpy(lower.data(), upper.data(), upper.size());
     return;
   }
   with_stored_type(kind.type, [&](auto zero) {
     using T = decltype(zero);
+    const std::size_t count = upper.size() / sizeof(T);
+    const std::byte* const from = upper.data();
+    std::byte* const to = lower.data();
+    const auto lay = [&](auto is_void_sample) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const T above = stored_at<T>(from + i * sizeof(T));
+        const T below = stored_at<T>(to + i * sizeof(T));
+        const T shown = !is_void_sample(above) || is_void_sample(below) ? above : below;
+        std::memcpy(to + i * sizeof(T), &shown, sizeof(T));
+      }
+    };
     if constexpr (std::is_integral_v<T>) {
-      if (kind.void_values.size() == 1 && !is_bounded(kind)) {
-        return lay_one_void_over<T>(upper.data(), lower.data(), count, kind.void_values.front());
-      }
+      if (const std::optional<double> value = only_void(kind))
+        return lay([only = static_cast<T>(*value)](T sample) { return sample == only; });
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::byte* const above = upper.data() + i * sizeof(T);
-      std::byte* const below = lower.data() + i * sizeof(T);
-      if (!is_void(kind, load<T>(above)) || is_void(kind, load<T>(below))) {
-        std::memcpy(below, above, sizeof(T));
-      }
-    }
+    lay([&](T sample) { return is_void(kind, static_cast<double>(number_of(sample))); });
   });
 }
 
@@ -295,13 +189,13 @@ void numbers_from_samples(const SampleKind& kind, std::span<const std::byte> raw
   with_stored_type(kind.type, [&](auto zero) {
     using T = decltype(zero);
     ISOHF_ASSERT(raw.size() == numbers.size() * sizeof(T));
-    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = load<T>(raw.data() + i * sizeof(T));
+    for (std::size_t i = 0; i < numbers.size(); ++i)
+      numbers[i] = static_cast<double>(number_of(stored_at<T>(raw.data() + i * sizeof(T))));
   });
   for (double& number : numbers) number = is_void(kind, number) ? kNaN : number;
 }
 
 void samples_from_numbers(SampleType type, std::span<const double> numbers, std::span<std::byte> raw) {
-  ISOHF_ASSERT(type == SampleType::kFloat32 || type == SampleType::kFloat64);
   const StoreSample store = store_sample(type);
   for (std::size_t i = 0; i < numbers.size(); ++i) store(numbers[i], raw.data() + i * size_bytes(type));
 }

@@ -14,92 +14,93 @@
 namespace isohf {
 namespace {
 
-/// Rows of small members are put together to strips of about this size.
+/// Strips of whole rows of members, or whole blocks of theirs, have about this size. Rows of small members are put
+/// together to strips of the first...
 constexpr std::int64_t kLeastStripBytes = std::int64_t{4} << 20U;
+constexpr std::int64_t kStripBytes = std::int64_t{16} << 20U;
+/// ...and one row of blocks may have this one, so that no block is decoded twice.
+constexpr std::int64_t kMostStripBytes = std::int64_t{256} << 20U;
+/// Parts of members that are read side by side.
+constexpr std::size_t kBatchBytes = std::size_t{8} << 20U;
 
-/// Coordinates this close to a sample, in samples, are its place: they are computed from origins and spacings.
+/// Coordinates this close to a sample, in samples, are its position: they are computed from origins and spacings.
 constexpr double kAtSample = 1e-6;
 
-/// Between two reads of strips, all open readers together may keep this many times what one source would.
-constexpr std::uint64_t kOpenReaders = 32;
+/// If layers of one resolution compete: no file is drawn yet.
+constexpr std::int32_t kNoFile = -1;
 
-std::uint64_t idle_bytes_within(std::uint64_t limit) {
-  return limit < ReaderPool::kMostIdleBytes / kOpenReaders ? kOpenReaders * limit : ReaderPool::kMostIdleBytes;
+constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
+
+/// As the members' readers are opened: as many as threads read, each its share.
+OpenOptions share_of(OpenOptions options, const MosaicPlan& plan) {
+  options.buffer_bytes /= static_cast<std::uint64_t>(plan.readers_at_once);
+  return options;
 }
 
-/// The most members that begin in one row: as many are read for a strip of a regular grid.
-std::uint64_t members_side_by_side(const MosaicLayer& layer) {
-  std::uint64_t most = 1;
-  std::uint64_t here = 1;
-  for (std::size_t i = 1; i < layer.members.size(); ++i) {
-    here = layer.members[i].row == layer.members[i - 1].row ? here + 1 : 1;
-    most = std::max(most, here);
+/// Rows of a strip: whole rows of members if these are not too large, else whole rows of their blocks.
+std::int64_t strip_rows(const MosaicPlan& plan) {
+  const MosaicLayer& finest = plan.layers.back();
+  std::int64_t pitch = plan.info.height;  // from one row of members to the next
+  for (std::size_t i = 1; i < finest.members.size(); ++i) {
+    const std::int64_t distance = finest.members[i].row - finest.members[i - 1].row;
+    if (distance > 0) pitch = std::min(pitch, distance);
   }
-  return most;
+  if (2 * pitch < finest.tallest) pitch = finest.tallest;
+  const std::int64_t row_bytes = plan.info.width * static_cast<std::int64_t>(size_bytes(plan.info.sample_type));
+  const std::int64_t block = std::min(plan.block_height, pitch);
+  std::int64_t rows = std::max<std::int64_t>(1, kMostStripBytes / row_bytes);
+  if (pitch <= kStripBytes / row_bytes) {
+    rows = pitch * std::max<std::int64_t>(1, kLeastStripBytes / row_bytes / pitch);
+  } else if (block <= rows) {
+    rows = block * std::max<std::int64_t>(1, kStripBytes / row_bytes / block);
+  }
+  return std::min(rows, plan.info.height);
 }
 
-/// A place between the samples of a coarser layer, on one axis.
+/// A position between the samples of a layer, on one axis.
 struct Between {
-  std::int64_t first = 0;    ///< the sample at or before it; -1 and the last one have but one neighbour inside
-  double fraction = 0.0;     ///< towards the next one, below 1
-  std::int64_t nearest = 0;  ///< -1: beyond the layer
+  std::int64_t first = 0;     ///< the sample at or before it; -1 and the last one have but one neighbour inside
+  double fraction = 0.0;      ///< towards the next one, below 1
+  std::int64_t nearest = -1;  ///< -1: beyond the layer
 };
 
-Between place_between(double position, std::int64_t samples, bool area) {
+/// outer: positions up to half a sample beyond the outermost ones count.
+Between between(double position, std::int64_t samples, bool outer) {
   const double nearest = std::floor(position + 0.5);
   if (std::abs(position - nearest) <= kAtSample) position = nearest;
-  const double reach = area ? 0.5 + kAtSample : 0.0;
-  Between place;
-  place.nearest = -1;
-  if (!(position >= -reach && position <= static_cast<double>(samples - 1) + reach)) return place;
-  place.first = static_cast<std::int64_t>(std::floor(position));
-  place.fraction = position - std::floor(position);
-  place.nearest = std::clamp<std::int64_t>(static_cast<std::int64_t>(nearest), 0, samples - 1);
-  return place;
+  const double reach = outer ? 0.5 + kAtSample : 0.0;
+  if (!(position >= -reach && position <= static_cast<double>(samples - 1) + reach)) return {};
+  const double first = std::floor(position);
+  return {static_cast<std::int64_t>(first), position - first,
+          std::clamp<std::int64_t>(static_cast<std::int64_t>(nearest), 0, samples - 1)};
 }
 
-/// Where samples first...first+count of the mosaic lie between those of a layer.
-std::vector<Between> places_between(double offset, double ratio, std::int64_t first, std::int64_t count,
-                                    std::int64_t samples, bool area) {
-  std::vector<Between> places(static_cast<std::size_t>(count));
-  for (std::int64_t i = 0; i < count; ++i) {
-    const double position = offset + static_cast<double>(first + i) * ratio;
-    places[static_cast<std::size_t>(i)] = place_between(position, samples, area);
-  }
-  return places;
-}
-
-/// The samples that interpolating at these places needs; {0, 0} where none.
-std::pair<std::int64_t, std::int64_t> needed(const std::vector<Between>& places, std::int64_t samples) {
-  std::int64_t low = samples;
-  std::int64_t high = -1;
-  for (const Between& place : places) {
-    if (place.nearest < 0) continue;
-    low = std::min(low, std::max<std::int64_t>(place.first, 0));
-    high = std::max(high, std::min(place.first + 1, samples - 1));
-  }
-  return low <= high ? std::pair(low, high - low + 1) : std::pair<std::int64_t, std::int64_t>(0, 0);
-}
-
-/// Some samples of a layer as numbers, NaN where void or outside.
+/// Some samples of a layer as numbers, NaN for voids and outside.
 struct Numbers {
   Window window;
   std::vector<double> values;
+  std::vector<std::int32_t> orders;  ///< of the files that show, if that matters
 
-  [[nodiscard]] double at(std::int64_t column, std::int64_t row) const {
+  [[nodiscard]] double at(std::int64_t column, std::int64_t row) const { return of(values, column, row, kVoid); }
+  [[nodiscard]] std::int32_t order_at(std::int64_t column, std::int64_t row) const {
+    return of(orders, column, row, kNoFile);
+  }
+
+ private:
+  template <typename T>
+  [[nodiscard]] T of(const std::vector<T>& all, std::int64_t column, std::int64_t row, T outside) const {
     const std::int64_t c = column - window.column;
     const std::int64_t r = row - window.row;
-    if (c < 0 || r < 0 || c >= window.columns || r >= window.rows) return std::numeric_limits<double>::quiet_NaN();
-    return values[static_cast<std::size_t>(r * window.columns + c)];
+    if (c < 0 || r < 0 || c >= window.columns || r >= window.rows) return outside;
+    return all[static_cast<std::size_t>(r * window.columns + c)];
   }
 };
 
-/// Bilinear interpolation. Points: void where a sample of some weight is. Areas: void where the nearest sample is, else
-/// the weighted mean of those that are not, so that the outer half of a pixel has its elevation.
-double interpolate_at(const Numbers& numbers, const Between& x, const Between& y, bool area) {
-  constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
+/// Bilinear interpolation. Void if a sample of some weight is; outer: only if the nearest sample is, else the weighted
+/// mean of those that are not, so that the outer half of a pixel has its elevation.
+double interpolated(const Numbers& numbers, const Between& x, const Between& y, bool outer) {
   if (x.nearest < 0 || y.nearest < 0) return kVoid;
-  if (area && std::isnan(numbers.at(x.nearest, y.nearest))) return kVoid;
+  if (outer && std::isnan(numbers.at(x.nearest, y.nearest))) return kVoid;
   double sum = 0.0;
   double weights = 0.0;
   bool all = true;
@@ -117,122 +118,107 @@ double interpolate_at(const Numbers& numbers, const Between& x, const Between& y
     }
   }
   if (all) return sum;
-  return area && weights > 0.0 ? sum / weights : kVoid;
+  return outer && weights > 0.0 ? sum / weights : kVoid;
 }
 
-/// Where nothing is drawn yet.
-constexpr std::int32_t kNoFile = -1;
-
-/// The file that a drawn sample of a layer is of.
-std::int32_t order_at(const std::vector<std::int32_t>& orders, const Window& window, std::int64_t column,
-                      std::int64_t row) {
-  if (column < window.column || row < window.row || column >= window.column + window.columns ||
-      row >= window.row + window.rows) {
-    return kNoFile;
-  }
-  return orders[static_cast<std::size_t>((row - window.row) * window.columns + column - window.column)];
-}
-
-/// Samples of the mosaic between two places that are computed: on a side of a cell, whose corners lie on multiples of it.
+/// Positions are computed in the corners of cells of so many samples, on multiples of it.
 constexpr std::int64_t kCell = 16;
-/// Where the middles of a cell's sides lie farther, in samples, from where its corners say, all its samples are computed.
+/// If the middles of a cell's sides lie farther, in samples, from where its corners say, all its samples are computed.
 constexpr double kStraight = 0.005;
-/// Places are rounded to this, which hides last bits of libraries.
+/// Positions are rounded to this, which hides last bits of libraries.
 constexpr double kPlaceGrain = 4096.0;
 
-/// Where a block of the mosaic's samples lies among those of a layer in another reference system.
+/// Where a block of the mosaic's samples lies among those of a layer, in columns and rows of the layer.
 class LayerPlaces {
  public:
   LayerPlaces(const MosaicLayer& layer, const Georeference& mosaic, const Window& block)
-      : layer_(layer), mosaic_(mosaic), block_(block), places_(static_cast<std::size_t>(block.columns * block.rows)) {
+      : layer_(layer), mosaic_(mosaic), block_(block) {
+    if (!layer.way) return;
+    places_.resize(static_cast<std::size_t>(block.columns * block.rows));
     const std::int64_t first_x = block.column / kCell;
     const std::int64_t first_y = block.row / kCell;
     const std::int64_t across = (block.column + block.columns - 1) / kCell - first_x + 1;
     const std::int64_t down = (block.row + block.rows - 1) / kCell - first_y + 1;
-    // Corners of cells and middles of their sides: every half cell but the middles of cells.
-    const std::int64_t stride = 2 * across + 1;
-    std::vector<MapPoint> nodes(static_cast<std::size_t>(stride * (2 * down + 1)));
-    oneapi::tbb::parallel_for(std::int64_t{0}, 2 * down + 1, [&](std::int64_t j) {
-      for (std::int64_t i = 0; i < stride; ++i) {
-        if (i % 2 == 1 && j % 2 == 1) continue;
-        nodes[static_cast<std::size_t>(j * stride + i)] =
-            exact(first_x * kCell + i * (kCell / 2), first_y * kCell + j * (kCell / 2));
-      }
-    });
     oneapi::tbb::parallel_for(std::int64_t{0}, across * down, [&](std::int64_t cell) {
-      const std::int64_t i = cell % across;
-      const std::int64_t j = cell / across;
-      fill((first_x + i) * kCell, (first_y + j) * kCell, nodes.data() + 2 * j * stride + 2 * i, stride);
+      fill((first_x + cell % across) * kCell, (first_y + cell / across) * kCell);
     });
   }
 
-  [[nodiscard]] const MapPoint& at(std::int64_t column, std::int64_t row) const {
-    return places_[static_cast<std::size_t>((row - block_.row) * block_.columns + column - block_.column)];
+  [[nodiscard]] MapPoint at(std::int64_t column, std::int64_t row) const {
+    if (layer_.way) return places_[index(column, row)];
+    return {(mosaic_.origin_x - layer_.origin_x) / layer_.spacing_x +
+                static_cast<double>(column) * (mosaic_.spacing_x / layer_.spacing_x),
+            (layer_.origin_y - mosaic_.origin_y) / layer_.spacing_y +
+                static_cast<double>(row) * (mosaic_.spacing_y / layer_.spacing_y)};
   }
-  /// The layer's samples that interpolating needs; empty where it has none there.
+
+  /// The layer's samples that interpolating needs; empty if it has none there.
   [[nodiscard]] Window needed() const {
-    double west = HUGE_VAL;
-    double east = -HUGE_VAL;
-    double north = HUGE_VAL;
-    double south = -HUGE_VAL;
+    MapPoint low = at(block_.column, block_.row);
+    MapPoint high = at(block_.column + block_.columns - 1, block_.row + block_.rows - 1);
     for (const MapPoint& place : places_) {
-      west = std::fmin(west, place.easting);
-      east = std::fmax(east, place.easting);
-      north = std::fmin(north, place.northing);
-      south = std::fmax(south, place.northing);
+      low = {std::fmin(low.easting, place.easting), std::fmin(low.northing, place.northing)};
+      high = {std::fmax(high.easting, place.easting), std::fmax(high.northing, place.northing)};
     }
     const auto width = static_cast<double>(layer_.width);
     const auto height = static_cast<double>(layer_.height);
-    if (!(west < width && east > -1.0 && north < height && south > -1.0)) return {};
-    Window window;
-    window.column = static_cast<std::int64_t>(std::clamp(std::floor(west), 0.0, width - 1.0));
-    window.row = static_cast<std::int64_t>(std::clamp(std::floor(north), 0.0, height - 1.0));
-    window.columns =
-        static_cast<std::int64_t>(std::clamp(std::floor(east) + 1.0, 0.0, width - 1.0)) - window.column + 1;
-    window.rows = static_cast<std::int64_t>(std::clamp(std::floor(south) + 1.0, 0.0, height - 1.0)) - window.row + 1;
-    return window;
+    if (!(low.easting < width && high.easting > -1.0 && low.northing < height && high.northing > -1.0)) return {};
+    const auto sample = [](double at, double samples) {
+      return static_cast<std::int64_t>(std::clamp(std::floor(at), 0.0, samples - 1.0));
+    };
+    const std::int64_t column = sample(low.easting, width);
+    const std::int64_t row = sample(low.northing, height);
+    return {column, row, sample(high.easting + 1.0, width) - column + 1, sample(high.northing + 1.0, height) - row + 1};
   }
 
  private:
-  [[nodiscard]] MapPoint exact(std::int64_t column, std::int64_t row) const {
+  [[nodiscard]] std::size_t index(std::int64_t column, std::int64_t row) const {
+    return static_cast<std::size_t>((row - block_.row) * block_.columns + column - block_.column);
+  }
+
+  [[nodiscard]] MapPoint projected(std::int64_t column, std::int64_t row) const {
     const MapPoint there =
         layer_.way->members_from_mosaic({mosaic_.origin_x + static_cast<double>(column) * mosaic_.spacing_x,
                                          mosaic_.origin_y - static_cast<double>(row) * mosaic_.spacing_y});
     double columns = (there.easting - layer_.origin_x) / layer_.spacing_x;
     if (!layer_.way->members) {  // degrees: on the turn nearest to the layer's middle
-      const double round = 360.0 / layer_.spacing_x;
       const double middle = static_cast<double>(layer_.width - 1) / 2.0;
-      columns = middle + std::remainder(columns - middle, round);
+      columns = middle + std::remainder(columns - middle, 360.0 / layer_.spacing_x);
     }
     return {columns, (layer_.origin_y - there.northing) / layer_.spacing_y};
   }
-  static double apart(const MapPoint& a, const MapPoint& b, const MapPoint& middle) {
-    return std::hypot((a.easting + b.easting) / 2.0 - middle.easting,
-                      (a.northing + b.northing) / 2.0 - middle.northing);
-  }
-  void fill(std::int64_t column, std::int64_t row, const MapPoint* corner, std::int64_t stride) {
-    const MapPoint& a = corner[0];
-    const MapPoint& b = corner[2];
-    const MapPoint& c = corner[2 * stride];
-    const MapPoint& d = corner[2 * stride + 2];
-    const double bend = std::max(apart(a, b, corner[1]), apart(c, d, corner[2 * stride + 1])) +
-                        std::max(apart(a, c, corner[stride]), apart(b, d, corner[stride + 2]));
-    const bool is_straight = bend <= kStraight;  // not where one of them is no place
+
+  /// The cell whose first sample is that one, as far as it lies in the block.
+  void fill(std::int64_t column, std::int64_t row) {
+    const MapPoint a = projected(column, row);
+    const MapPoint b = projected(column + kCell, row);
+    const MapPoint c = projected(column, row + kCell);
+    const MapPoint d = projected(column + kCell, row + kCell);
+    const auto blend = [&](double s, double t) {
+      const auto of = [&](double MapPoint::*axis) {
+        return (1.0 - t) * ((1.0 - s) * a.*axis + s * b.*axis) + t * ((1.0 - s) * c.*axis + s * d.*axis);
+      };
+      return MapPoint{of(&MapPoint::easting), of(&MapPoint::northing)};
+    };
+    // How far the middle of a side lies from where its ends say. The middle of the cell would not do: on conformal maps
+    // its sides bend both ways.
+    const auto sag = [&](const MapPoint& from, const MapPoint& to, std::int64_t x, std::int64_t y) {
+      const MapPoint middle = projected(column + x, row + y);
+      return std::hypot((from.easting + to.easting) / 2.0 - middle.easting,
+                        (from.northing + to.northing) / 2.0 - middle.northing);
+    };
+    const double bend = std::max(sag(a, b, kCell / 2, 0), sag(c, d, kCell / 2, kCell)) +
+                        std::max(sag(a, c, 0, kCell / 2), sag(b, d, kCell, kCell / 2));
+    const bool is_straight = bend <= kStraight;  // false if one of them has no position
     const std::int64_t end_column = std::min(column + kCell, block_.column + block_.columns);
     const std::int64_t end_row = std::min(row + kCell, block_.row + block_.rows);
     for (std::int64_t y = std::max(row, block_.row); y < end_row; ++y) {
       for (std::int64_t x = std::max(column, block_.column); x < end_column; ++x) {
-        const double s = static_cast<double>(x - column) / kCell;
-        const double t = static_cast<double>(y - row) / kCell;
-        const auto blend = [&](double from_a, double from_b, double from_c, double from_d) {
-          return (1.0 - t) * ((1.0 - s) * from_a + s * from_b) + t * ((1.0 - s) * from_c + s * from_d);
-        };
-        const MapPoint place = is_straight ? MapPoint{blend(a.easting, b.easting, c.easting, d.easting),
-                                                      blend(a.northing, b.northing, c.northing, d.northing)}
-                                           : exact(x, y);
-        places_[static_cast<std::size_t>((y - block_.row) * block_.columns + x - block_.column)] = {
-            std::round(place.easting * kPlaceGrain) / kPlaceGrain,
-            std::round(place.northing * kPlaceGrain) / kPlaceGrain};
+        const MapPoint place =
+            is_straight ? blend(static_cast<double>(x - column) / kCell, static_cast<double>(y - row) / kCell)
+                        : projected(x, y);
+        places_[index(x, y)] = {std::round(place.easting * kPlaceGrain) / kPlaceGrain,
+                                std::round(place.northing * kPlaceGrain) / kPlaceGrain};
       }
     }
   }
@@ -240,7 +226,7 @@ class LayerPlaces {
   const MosaicLayer& layer_;
   const Georeference& mosaic_;
   Window block_;
-  std::vector<MapPoint> places_;  ///< columns and rows of the layer
+  std::vector<MapPoint> places_;  ///< of each sample, if the layer is of another reference system
 };
 
 }  // namespace
@@ -254,70 +240,41 @@ struct MosaicSource::Part {
   std::span<std::byte> samples;  ///< of the mosaic's kind
 };
 
+/// Samples of a window, on which layers are laid.
+struct MosaicSource::Canvas {
+  Window window;
+  std::span<std::byte> samples;
+  std::vector<std::int32_t> orders = {};  ///< of each sample the file that shows; empty if no layers compete
+
+  void expect_files(bool several) {
+    orders.assign(several ? static_cast<std::size_t>(window.columns * window.rows) : 0, kNoFile);
+  }
+};
+
 MosaicSource::MosaicSource(std::string path, MosaicPlan plan, const OpenOptions& options, OverlapRule rule)
     : plan_(std::move(plan)),
       rule_(rule),
-      unpacked_bytes_(options.unpacked_bytes),
-      pool_(options),
-      strips_(plan_.info, [this](const Window& window, std::span<std::byte> samples) { compose(window, samples); }) {
+      idle_bytes_(options.buffer_bytes),
+      pool_(share_of(options, plan_), options.buffer_bytes) {
   plan_.info.path = std::move(path);
-  choose_strips();
-  share_memory(ReaderPool::kMostIdleBytes);
+  plan_.info.block_height = strip_rows(plan_);
 }
 
-void MosaicSource::choose_strips() {
-  SourceInfo& info = plan_.info;
-  const MosaicLayer& finest = plan_.layers.back();
-  // Rows from one row of members to the next.
-  std::int64_t pitch = info.height;
-  for (std::size_t i = 1; i < finest.members.size(); ++i) {
-    const std::int64_t distance = finest.members[i].row - finest.members[i - 1].row;
-    if (distance > 0) pitch = std::min(pitch, distance);
-  }
-  if (2 * pitch < finest.tallest) pitch = finest.tallest;
-  const std::int64_t row_bytes = info.width * static_cast<std::int64_t>(size_bytes(info.sample_type));
-  const std::int64_t block = std::min(plan_.block_height, pitch);
-  std::int64_t rows = 0;
-  if (pitch <= kStripBytes / row_bytes) {
-    rows = pitch * std::max<std::int64_t>(1, kLeastStripBytes / row_bytes / pitch);
-  } else if (block <= kMostStripBytes / row_bytes) {
-    rows = block * std::max<std::int64_t>(1, kStripBytes / row_bytes / block);
-  } else {
-    rows = std::max<std::int64_t>(1, kMostStripBytes / row_bytes);
-  }
-  info.block_height = std::min(rows, info.height);
-  strips_.set_rows(info.block_height);
-}
-
-/// Packed members are held only where all those of a strip can be: opening one anew for each strip costs more than
-/// going on from where it was. Where they are more than may be open, they are opened anew anyhow.
-void MosaicSource::share_memory(std::uint64_t idle_bytes) {
-  pool_.limit_idle(idle_bytes);
-  std::uint64_t each = unpacked_bytes_ / static_cast<std::uint64_t>(plan_.readers_at_once);
-  const std::uint64_t members = members_side_by_side(plan_.layers.back());
-  if (members <= pool_.most_open()) each = std::min(each, std::min(idle_bytes, unpacked_bytes_) / members);
-  pool_.limit_unpacked(each);
-}
-
-void MosaicSource::limit_buffers(std::uint64_t bytes) {
-  share_memory(idle_bytes_within(bytes));
-}
-
-std::uint64_t MosaicSource::buffer_bytes(std::uint64_t limit) const {
+std::uint64_t MosaicSource::buffer_bytes() const {
   bool has_orders = false;
-  for (std::size_t layer = 0; layer < plan_.layers.size(); ++layer) has_orders = has_orders || plan_.is_tied(layer);
-  const std::uint64_t strip = static_cast<std::uint64_t>(plan_.info.block_height) *
-                              static_cast<std::uint64_t>(plan_.info.width) *
-                              (size_bytes(plan_.info.sample_type) + (has_orders ? sizeof(std::int32_t) : 0));
   std::uint64_t members = 0;
-  for (const MosaicLayer& layer : plan_.layers) members += layer.members.size();
+  for (std::size_t layer = 0; layer < plan_.layers.size(); ++layer) {
+    has_orders = has_orders || plan_.is_tied(layer);
+    members += plan_.layers[layer].members.size();
+  }
+  const std::uint64_t strip = static_cast<std::uint64_t>(plan_.info.block_height * plan_.info.width) *
+                              (size_bytes(plan_.info.sample_type) + (has_orders ? sizeof(std::int32_t) : 0));
   const std::uint64_t reading = static_cast<std::uint64_t>(plan_.readers_at_once) * plan_.reader_bytes;
   const std::uint64_t open = std::min<std::uint64_t>(members, pool_.most_open()) * plan_.reader_bytes;
-  std::int64_t widest = 0;
-  for (const MosaicMember& member : plan_.layers.back().members) widest = std::max(widest, member.width);
+  const std::int64_t widest = std::ranges::max(plan_.layers.back().members, {}, &MosaicMember::width).width;
   const std::size_t part = bytes_of({0, 0, widest, plan_.info.block_height});
   const std::uint64_t parts = std::min<std::uint64_t>(strip, std::max(part, kBatchBytes));
-  return strip + parts + std::min(open, reading + idle_bytes_within(limit));
+  return strip + parts + std::min(open, reading + idle_bytes_);
 }
 
 std::size_t MosaicSource::bytes_of(const Window& window) const {
@@ -329,92 +286,110 @@ void MosaicSource::read_window(const Window& window, std::span<std::byte> sample
   ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
   ISOHF_ASSERT(window.column + window.columns <= info.width && window.row + window.rows <= info.height);
   ISOHF_ASSERT(samples.size() == bytes_of(window));
-  strips_.read(window, samples);
+  // Passes read the same columns again and again; the first window of others is read as it is.
+  const bool is_first_of_whole = strip_.columns == 0 && window.columns == info.width;
+  const bool follows = is_first_of_whole || (window.column == strip_.column && window.columns == strip_.columns);
+  if (!follows) strip_.rows = 0;
+  strip_.column = window.column;
+  strip_.columns = window.columns;
+  const std::size_t row_bytes = bytes_of({0, 0, window.columns, 1});
+  const std::int64_t end = window.row + window.rows;
+  for (std::int64_t row = window.row; row < end;) {
+    Window strip = window;
+    strip.row = row - row % info.block_height;
+    strip.rows = std::min(info.block_height, info.height - strip.row);
+    const std::int64_t rows = std::min(end, strip.row + strip.rows) - row;
+    const auto out = samples.subspan(static_cast<std::size_t>(row - window.row) * row_bytes,
+                                     static_cast<std::size_t>(rows) * row_bytes);
+    const bool is_kept = strip_.rows > 0 && strip_.row == strip.row;
+    if (!is_kept && (!follows || rows == strip.rows)) {
+      compose({window.column, row, window.columns, rows}, out);
+    } else {
+      if (!is_kept) {
+        strip_.rows = 0;
+        strip_samples_.resize(bytes_of(strip));
+        compose(strip, strip_samples_);
+        strip_ = strip;
+      }
+      std::memcpy(out.data(), strip_samples_.data() + static_cast<std::size_t>(row - strip.row) * row_bytes,
+                  out.size());
+    }
+    row += rows;
+  }
 }
 
 void MosaicSource::compose(const Window& window, std::span<std::byte> out) {
   fill_with(plan_.samples.gap, out);
-  Orders orders;
-  for (std::size_t layer = 0; layer < plan_.layers.size(); ++layer) {
-    if (layer == 0 || plan_.layers[layer].rank != plan_.layers[layer - 1].rank) orders = orders_for(layer, window);
-    if (plan_.is_on_grid(plan_.layers[layer])) {
-      draw(layer, window, out, orders);
-    } else if (plan_.layers[layer].way) {
-      reproject(layer, false, window, out, orders);
-    } else {
-      interpolate(layer, window, out, orders);
-    }
+  const bool is_area = plan_.info.georeference.registration != Registration::kPoint;
+  Canvas canvas{window, out};
+  for (std::size_t i = 0; i < plan_.layers.size(); ++i) {
+    const MosaicLayer& layer = plan_.layers[i];
+    if (i == 0 || layer.rank != plan_.layers[i - 1].rank) canvas.expect_files(plan_.is_tied(i));
+    // Of other reference systems at first between samples alone, so that none is continued next to a layer that knows
+    // better.
+    plan_.is_on_grid(layer) ? draw(i, canvas) : interpolate(i, is_area && !layer.way, false, canvas);
   }
-  if (plan_.info.georeference.registration == Registration::kPoint) return;
-  for (std::size_t layer = plan_.layers.size(); layer-- > 0;) {
-    Orders none;
-    if (plan_.layers[layer].way) reproject(layer, true, window, out, none);
-  }
-}
-
-MosaicSource::Orders MosaicSource::orders_for(std::size_t layer, const Window& window) const {
-  if (!plan_.is_tied(layer)) return {};
-  return Orders(static_cast<std::size_t>(window.columns * window.rows), kNoFile);
-}
-
-void MosaicSource::lay_by_order(std::span<const std::byte> upper, std::span<const std::int32_t> upper_orders,
-                                std::span<std::byte> lower, std::span<std::int32_t> lower_orders) const {
-  const std::size_t sample_bytes = size_bytes(plan_.info.sample_type);
-  std::vector<double> numbers(upper_orders.size());
-  numbers_from_samples(plan_.samples.kind, upper, numbers);
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const std::int32_t above = upper_orders[i];
-    const std::int32_t below = lower_orders[i];
-    if (std::isnan(numbers[i]) || (below != kNoFile && (rule_ == OverlapRule::kLast ? above < below : above > below)))
-      continue;
-    std::memcpy(lower.data() + i * sample_bytes, upper.data() + i * sample_bytes, sample_bytes);
-    lower_orders[i] = above;
+  // Then, where nothing else is, outermost samples as far as their areas reach.
+  canvas.expect_files(false);
+  for (std::size_t i = plan_.layers.size(); is_area && i-- > 0;) {
+    if (plan_.layers[i].way) interpolate(i, true, true, canvas);
   }
 }
 
 std::vector<MosaicSource::Part> MosaicSource::parts_in(std::size_t layer, const Window& window) const {
   const MosaicLayer& members = plan_.layers[layer];
   std::vector<Part> parts;
-  auto next = std::lower_bound(members.members.begin(), members.members.end(), window.row - members.tallest + 1,
-                               [](const MosaicMember& member, std::int64_t row) { return member.row < row; });
+  auto next = std::ranges::lower_bound(members.members, window.row - members.tallest + 1, {}, &MosaicMember::row);
   for (; next != members.members.end() && next->row < window.row + window.rows; ++next) {
-    Part part;
-    part.member = &*next;
-    part.column = next->column;
-    part.row = next->row;
-    if (overlap(part.column, part.own.column, part.own.columns, next->width, window.column, window.columns) > 0 &&
-        overlap(part.row, part.own.row, part.own.rows, next->height, window.row, window.rows) > 0) {
-      parts.push_back(part);
-    }
+    const Span columns = intersection({next->column, next->width}, {window.column, window.columns});
+    const Span rows = intersection({next->row, next->height}, {window.row, window.rows});
+    if (columns.count <= 0 || rows.count <= 0) continue;
+    const Window own{columns.first - next->column, rows.first - next->row, columns.count, rows.count};
+    parts.push_back({&*next, own, columns.first - window.column, rows.first - window.row, {}});
   }
-  std::sort(parts.begin(), parts.end(), [&](const Part& a, const Part& b) {
+  std::ranges::sort(parts, [&](const Part& a, const Part& b) {
     return rule_ == OverlapRule::kLast ? a.member->order < b.member->order : a.member->order > b.member->order;
   });
   return parts;
 }
 
-void MosaicSource::read_part(Part& part) {
+void MosaicSource::read_part(const Part& part) {
   const MosaicMember& member = *part.member;
   const SampleKind& kind = plan_.kinds[member.kind];
-  std::unique_ptr<HeightSource> reader = pool_.take(member.order, member);
-  const auto read = [&](std::span<std::byte> raw) {
-    try {
-      reader->read_window(part.own, raw);
-    } catch (...) {
-      pool_.give_back(member.order, std::move(reader));
-      throw;
-    }
-    pool_.give_back(member.order, std::move(reader));
-  };
-  if (kind == plan_.samples.kind) return read(part.samples);
-  std::vector<std::byte> raw(static_cast<std::size_t>(part.own.columns * part.own.rows) * size_bytes(kind.type));
-  read(raw);
-  convert_samples(kind, raw, plan_.samples, part.samples);
+  const bool is_alike = kind == plan_.samples.kind;
+  std::vector<std::byte> raw;
+  if (!is_alike) raw.resize(static_cast<std::size_t>(part.own.columns * part.own.rows) * size_bytes(kind.type));
+  std::unique_ptr<HeightSource> reader = pool_.take(member);
+  try {
+    reader->read_window(part.own, is_alike ? part.samples : std::span(raw));
+  } catch (...) {
+    pool_.give_back(member, std::move(reader));
+    throw;
+  }
+  pool_.give_back(member, std::move(reader));
+  if (!is_alike) convert_samples(kind, raw, plan_.samples, part.samples);
 }
 
-void MosaicSource::draw(std::size_t layer, const Window& window, std::span<std::byte> out, Orders& orders) {
-  std::vector<Part> parts = parts_in(layer, window);
+/// A row of samples onto others: where their file is to be seen, void ones nowhere. column, row  in the window
+void MosaicSource::lay(std::span<const std::byte> upper, std::span<const std::int32_t> orders, std::int64_t row,
+                       std::int64_t column, Canvas& canvas) const {
   const std::size_t sample_bytes = size_bytes(plan_.info.sample_type);
+  const auto first = static_cast<std::size_t>(row * canvas.window.columns + column);
+  const std::span<std::byte> lower = canvas.samples.subspan(first * sample_bytes, upper.size());
+  if (canvas.orders.empty()) return lay_over(plan_.samples.kind, upper, lower);
+  std::vector<double> numbers(orders.size());
+  numbers_from_samples(plan_.samples.kind, upper, numbers);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    std::int32_t& below = canvas.orders[first + i];
+    const bool is_hidden = below != kNoFile && (rule_ == OverlapRule::kLast ? orders[i] < below : orders[i] > below);
+    if (is_hidden || std::isnan(numbers[i])) continue;
+    std::memcpy(lower.data() + i * sample_bytes, upper.data() + i * sample_bytes, sample_bytes);
+    below = orders[i];
+  }
+}
+
+void MosaicSource::draw(std::size_t layer, Canvas& canvas) {
+  std::vector<Part> parts = parts_in(layer, canvas.window);
   for (std::size_t from = 0; from < parts.size();) {
     std::size_t end = from;
     std::size_t bytes = 0;
@@ -430,128 +405,91 @@ void MosaicSource::draw(std::size_t layer, const Window& window, std::span<std::
     }
     oneapi::tbb::parallel_for(from, end, [&](std::size_t i) { read_part(parts[i]); });
     // Rows are laid over each other side by side, the parts of each in their order.
-    oneapi::tbb::parallel_for(std::int64_t{0}, window.rows, [&](std::int64_t row) {
+    oneapi::tbb::parallel_for(std::int64_t{0}, canvas.window.rows, [&](std::int64_t row) {
       for (std::size_t i = from; i < end; ++i) {
         const Part& part = parts[i];
         if (row < part.row || row >= part.row + part.own.rows) continue;
-        const auto columns = static_cast<std::size_t>(part.own.columns);
-        const std::size_t part_bytes = columns * sample_bytes;
-        const auto first = static_cast<std::size_t>(row * window.columns + part.column);
-        const auto upper = part.samples.subspan(static_cast<std::size_t>(row - part.row) * part_bytes, part_bytes);
-        const auto lower = out.subspan(first * sample_bytes, part_bytes);
-        if (orders.empty()) {
-          lay_over(plan_.samples.kind, upper, lower);
-        } else {
-          const Orders own(columns, static_cast<std::int32_t>(part.member->order));
-          lay_by_order(upper, own, lower, std::span(orders).subspan(first, columns));
-        }
+        const std::size_t part_bytes = bytes_of({0, 0, part.own.columns, 1});
+        const std::vector<std::int32_t> orders(canvas.orders.empty() ? 0 : static_cast<std::size_t>(part.own.columns),
+                                               static_cast<std::int32_t>(part.member->order));
+        lay(part.samples.subspan(static_cast<std::size_t>(row - part.row) * part_bytes, part_bytes), orders, row,
+            part.column, canvas);
       }
     });
     from = end;
   }
 }
 
-void MosaicSource::interpolate(std::size_t layer, const Window& window, std::span<std::byte> out, Orders& orders) {
-  const MosaicLayer& coarse = plan_.layers[layer];
-  const Georeference& place = plan_.info.georeference;
-  const bool area = place.registration != Registration::kPoint;
-  const std::vector<Between> x =
-      places_between((place.origin_x - coarse.origin_x) / coarse.spacing_x, place.spacing_x / coarse.spacing_x,
-                     window.column, window.columns, coarse.width, area);
-  const std::vector<Between> y =
-      places_between((coarse.origin_y - place.origin_y) / coarse.spacing_y, place.spacing_y / coarse.spacing_y,
-                     window.row, window.rows, coarse.height, area);
-  Numbers numbers;
-  std::tie(numbers.window.column, numbers.window.columns) = needed(x, coarse.width);
-  std::tie(numbers.window.row, numbers.window.rows) = needed(y, coarse.height);
-  if (numbers.window.columns == 0 || numbers.window.rows == 0) return;
-  Orders drawn_orders = orders.empty() ? Orders() : orders_for(layer, numbers.window);
-  {
-    std::vector<std::byte> samples(bytes_of(numbers.window));
-    fill_with(plan_.samples.gap, samples);
-    draw(layer, numbers.window, samples, drawn_orders);
-    numbers.values.resize(static_cast<std::size_t>(numbers.window.columns * numbers.window.rows));
-    numbers_from_samples(plan_.samples.kind, samples, numbers.values);
-  }
-  const std::size_t row_bytes = static_cast<std::size_t>(window.columns) * size_bytes(plan_.info.sample_type);
-  oneapi::tbb::parallel_for(std::int64_t{0}, window.rows, [&](std::int64_t row) {
-    std::vector<double> values(x.size());
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      values[i] = interpolate_at(numbers, x[i], y[static_cast<std::size_t>(row)], area);
-    }
-    std::vector<std::byte> samples(row_bytes);
-    samples_from_numbers(plan_.info.sample_type, values, samples);
-    const auto lower = out.subspan(static_cast<std::size_t>(row) * row_bytes, row_bytes);
-    if (orders.empty()) return lay_over(plan_.samples.kind, samples, lower);
-    Orders own(x.size(), kNoFile);
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      own[i] = order_at(drawn_orders, numbers.window, x[i].nearest, y[static_cast<std::size_t>(row)].nearest);
-    }
-    lay_by_order(samples, own, lower, std::span(orders).subspan(static_cast<std::size_t>(row) * x.size(), x.size()));
-  });
-}
-
-/// outer: where nothing else is, outermost samples as far as their areas reach; else between samples alone, so that
-/// none is continued beside a layer that knows better.
-void MosaicSource::reproject(std::size_t layer, bool outer, const Window& window, std::span<std::byte> out,
-                             Orders& orders) {
-  // Blocks as wide as high: what they need of a layer that lies askew is little more than they have themselves.
+/// outer: outermost samples count as far as their areas reach. below: under what is there already.
+void MosaicSource::interpolate(std::size_t layer, bool outer, bool below, Canvas& canvas) {
+  const Window& window = canvas.window;
+  // What blocks as wide as high need of a layer that lies askew is little more than they have themselves.
   constexpr std::int64_t kBlock = 512;
-  for (std::int64_t row = window.row; row < window.row + window.rows; row += kBlock) {
-    for (std::int64_t column = window.column; column < window.column + window.columns; column += kBlock) {
-      const Window block{column, row, std::min(kBlock, window.column + window.columns - column),
-                         std::min(kBlock, window.row + window.rows - row)};
-      if (!outer || has_void(block, window, out)) reproject_block(layer, outer, block, window, out, orders);
+  const std::int64_t side = plan_.layers[layer].way ? kBlock : std::max(window.columns, window.rows);
+  for (std::int64_t row = window.row; row < window.row + window.rows; row += side) {
+    for (std::int64_t column = window.column; column < window.column + window.columns; column += side) {
+      const Window block{column, row, std::min(side, window.column + window.columns - column),
+                         std::min(side, window.row + window.rows - row)};
+      if (!below || has_void(block, canvas)) interpolate_block(layer, outer, below, block, canvas);
     }
   }
 }
 
-bool MosaicSource::has_void(const Window& block, const Window& window, std::span<const std::byte> out) const {
-  const std::size_t sample_bytes = size_bytes(plan_.info.sample_type);
+bool MosaicSource::has_void(const Window& block, const Canvas& canvas) const {
   std::vector<double> numbers(static_cast<std::size_t>(block.columns));
   for (std::int64_t row = block.row; row < block.row + block.rows; ++row) {
-    const std::int64_t first = (row - window.row) * window.columns + block.column - window.column;
+    const Window before{0, 0, (row - canvas.window.row) * canvas.window.columns + block.column - canvas.window.column,
+                        1};
     numbers_from_samples(plan_.samples.kind,
-                         out.subspan(static_cast<std::size_t>(first) * sample_bytes, numbers.size() * sample_bytes),
-                         numbers);
-    if (std::any_of(numbers.begin(), numbers.end(), [](double number) { return std::isnan(number); })) return true;
+                         canvas.samples.subspan(bytes_of(before), bytes_of({0, 0, block.columns, 1})), numbers);
+    if (std::ranges::any_of(numbers, [](double number) { return std::isnan(number); })) return true;
   }
   return false;
 }
 
-void MosaicSource::reproject_block(std::size_t layer, bool outer, const Window& block, const Window& window,
-                                   std::span<std::byte> out, Orders& orders) {
+void MosaicSource::interpolate_block(std::size_t layer, bool outer, bool below, const Window& block, Canvas& canvas) {
   const MosaicLayer& other = plan_.layers[layer];
   const LayerPlaces places(other, plan_.info.georeference, block);
-  Numbers numbers;
-  numbers.window = places.needed();
+  Numbers numbers{places.needed(), {}, {}};
   if (numbers.window.columns <= 0 || numbers.window.rows <= 0) return;
-  std::vector<std::byte> drawn(bytes_of(numbers.window));
-  fill_with(plan_.samples.gap, drawn);
-  Orders drawn_orders = orders.empty() ? Orders() : orders_for(layer, numbers.window);
-  draw(layer, numbers.window, drawn, drawn_orders);
-  numbers.values.resize(static_cast<std::size_t>(numbers.window.columns * numbers.window.rows));
-  numbers_from_samples(plan_.samples.kind, drawn, numbers.values);
-  const std::size_t sample_bytes = size_bytes(plan_.info.sample_type);
+  {
+    std::vector<std::byte> samples(bytes_of(numbers.window));
+    fill_with(plan_.samples.gap, samples);
+    Canvas drawn{numbers.window, samples};
+    drawn.expect_files(!canvas.orders.empty());
+    draw(layer, drawn);
+    numbers.values.resize(static_cast<std::size_t>(numbers.window.columns * numbers.window.rows));
+    numbers_from_samples(plan_.samples.kind, samples, numbers.values);
+    numbers.orders = std::move(drawn.orders);
+  }
+  std::vector<Between> columns;  // the same in all rows of a layer that lies straight
+  for (std::int64_t i = 0; !other.way && i < block.columns; ++i)
+    columns.push_back(between(places.at(block.column + i, block.row).easting, other.width, outer));
   oneapi::tbb::parallel_for(block.row, block.row + block.rows, [&](std::int64_t row) {
     std::vector<double> values(static_cast<std::size_t>(block.columns));
-    Orders own(orders.empty() ? 0 : values.size(), kNoFile);
-    for (std::int64_t i = 0; i < block.columns; ++i) {
-      const MapPoint& place = places.at(block.column + i, row);
-      const Between x = place_between(place.easting, other.width, outer);
-      const Between y = place_between(place.northing, other.height, outer);
-      values[static_cast<std::size_t>(i)] = interpolate_at(numbers, x, y, outer);
-      if (!own.empty()) own[static_cast<std::size_t>(i)] = order_at(drawn_orders, numbers.window, x.nearest, y.nearest);
+    std::vector<std::int32_t> orders(numbers.orders.empty() ? 0 : values.size(), kNoFile);
+    Between y = between(places.at(block.column, row).northing, other.height, outer);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      Between x;
+      if (other.way) {
+        const MapPoint place = places.at(block.column + static_cast<std::int64_t>(i), row);
+        x = between(place.easting, other.width, outer);
+        y = between(place.northing, other.height, outer);
+      } else {
+        x = columns[i];
+      }
+      values[i] = interpolated(numbers, x, y, outer);
+      if (!orders.empty()) orders[i] = numbers.order_at(x.nearest, y.nearest);
     }
-    std::vector<std::byte> samples(values.size() * sample_bytes);
+    std::vector<std::byte> samples(bytes_of({0, 0, block.columns, 1}));
     samples_from_numbers(plan_.info.sample_type, values, samples);
-    const std::int64_t first = (row - window.row) * window.columns + block.column - window.column;
-    const auto there = out.subspan(static_cast<std::size_t>(first) * sample_bytes, samples.size());
-    if (!own.empty())
-      return lay_by_order(samples, own, there, std::span(orders).subspan(static_cast<std::size_t>(first), own.size()));
-    if (!outer) return lay_over(plan_.samples.kind, samples, there);
-    lay_over(plan_.samples.kind, there, samples);
-    std::copy(samples.begin(), samples.end(), there.begin());
+    const std::int64_t canvas_row = row - canvas.window.row;
+    const std::int64_t canvas_column = block.column - canvas.window.column;
+    if (below) {
+      const Window before{0, 0, canvas_row * canvas.window.columns + canvas_column, 1};
+      lay_over(plan_.samples.kind, canvas.samples.subspan(bytes_of(before), samples.size()), samples);
+    }
+    lay(samples, orders, canvas_row, canvas_column, canvas);
   });
 }
 

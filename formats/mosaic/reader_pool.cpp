@@ -1,7 +1,6 @@
 #include "formats/mosaic/reader_pool.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <utility>
@@ -10,22 +9,8 @@
 #include "isohf/raster.h"
 
 namespace isohf {
-namespace {
-
-constexpr std::size_t kMostOpen = 64;
-/// Left to the archive, its journal, the terminal, shared libraries and whatever the caller has open.
-constexpr std::size_t kFilesForOthers = 32;
-
-}  // namespace
-
-std::size_t most_open_rasters() {
-  struct rlimit limit {};
-  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kMostOpen;
-  const auto allowed = static_cast<std::size_t>(limit.rlim_cur);
-  return std::clamp<std::size_t>(allowed > kFilesForOthers ? allowed - kFilesForOthers : 1, 1, kMostOpen);
-}
-
-ReaderPool::ReaderPool(OpenOptions options) : options_(std::move(options)), most_open_(most_open_rasters()) {}
+ReaderPool::ReaderPool(OpenOptions options, std::uint64_t most_idle_bytes)
+    : options_(std::move(options)), most_open_(most_open_rasters()), most_idle_bytes_(most_idle_bytes) {}
 
 void ReaderPool::close_oldest(std::list<Idle>& closed) {
   idle_bytes_ -= idle_.front().bytes;
@@ -39,19 +24,12 @@ void ReaderPool::close_surplus(std::list<Idle>& closed) {
   while (!idle_.empty() && (lent_ + idle_.size() > most_open_ || too_much())) close_oldest(closed);
 }
 
-void ReaderPool::limit_idle(std::uint64_t bytes) {
-  std::list<Idle> closed;  // destroyed without the lock
-  const std::lock_guard lock(mutex_);
-  most_idle_bytes_ = std::min(bytes, kMostIdleBytes);
-  close_surplus(closed);
-}
-
-std::unique_ptr<HeightSource> ReaderPool::take(std::int64_t key, const MosaicMember& member) {
-  std::list<Idle> closed;  // destroyed without the lock
+std::unique_ptr<HeightSource> ReaderPool::take(const MosaicMember& member) {
   {
+    std::list<Idle> closed;
     const std::lock_guard lock(mutex_);
     ++lent_;
-    if (const auto found = places_.find(key); found != places_.end()) {
+    if (const auto found = places_.find(member.order); found != places_.end()) {
       std::unique_ptr<HeightSource> reader = std::move(found->second->reader);
       idle_bytes_ -= found->second->bytes;
       idle_.erase(found->second);
@@ -61,17 +39,14 @@ std::unique_ptr<HeightSource> ReaderPool::take(std::int64_t key, const MosaicMem
     ++times_opened_;
     while (!idle_.empty() && lent_ + idle_.size() > most_open_) close_oldest(closed);
   }
-  closed.clear();
   try {
     require_unchanged(member.path, member.stamp);
     std::unique_ptr<HeightSource> reader = open_raster(member.path, options_);
     const SourceInfo& info = reader->info();
-    if (info.width != member.width || info.height != member.height) {
-      throw Error(ErrorCode::kIo, fmt::format("{}: has {}x{} samples and had {}x{} when the mosaic was planned; begin "
-                                              "again",
-                                              member.path, info.width, info.height, member.width, member.height));
-    }
-    return reader;
+    if (info.width == member.width && info.height == member.height) return reader;
+    throw Error(ErrorCode::kIo,
+                fmt::format("{}: has {}x{} samples and had {}x{} when the mosaic was planned; begin again", member.path,
+                            info.width, info.height, member.width, member.height));
   } catch (...) {
     const std::lock_guard lock(mutex_);
     --lent_;
@@ -79,13 +54,13 @@ std::unique_ptr<HeightSource> ReaderPool::take(std::int64_t key, const MosaicMem
   }
 }
 
-void ReaderPool::give_back(std::int64_t key, std::unique_ptr<HeightSource> reader) {
+void ReaderPool::give_back(const MosaicMember& member, std::unique_ptr<HeightSource> reader) {
   std::list<Idle> closed;
-  const std::uint64_t bytes = reader->buffer_bytes(UINT64_MAX);
+  const std::uint64_t bytes = reader->buffer_bytes();
   const std::lock_guard lock(mutex_);
   --lent_;
-  idle_.push_back({key, std::move(reader), bytes});
-  places_[key] = std::prev(idle_.end());
+  idle_.push_back({member.order, std::move(reader), bytes});
+  places_[member.order] = std::prev(idle_.end());
   idle_bytes_ += bytes;
   close_surplus(closed);
 }

@@ -1,141 +1,41 @@
-#include "formats/oiio/oiio_module.h"
-
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
+#include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <new>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "formats/module_inside.h"
+#include "formats/oiio/oiio_plugin.h"
 #include "isohf/error.h"
-#include "isohf/raster.h"
 
-// The module is a library of its own: it shares headers with isohf, no code.
-struct IsohfOiioRaster {
-  std::unique_ptr<OIIO::ImageInput> input;
-  OIIO::ImageSpec spec;
-  OIIO::TypeDesc type;
-  int channel = 0;
-  int channels = 1;  ///< that are delivered, from `channel` on
-  std::int64_t band_bytes = 0;
-  std::vector<unsigned char> band;  ///< rows read around a window that does not end where the file's blocks do
-};
-
+namespace isohf {
 namespace {
 
-using isohf::Error;
-using isohf::ErrorCode;
-using isohf::put_text;
-using isohf::SampleType;
-
-/// `action` on the far side of the C boundary.
-template <typename Action>
-int guarded(IsohfOiioMessage* message, Action action) {
-  return isohf::guarded(message, "OpenImageIO", ErrorCode::kCorrupt, action);
-}
-
-/// A header ends within it, or the file is none that isohf judges.
-constexpr std::size_t kHeaderBytes = std::size_t{1} << 20U;
-
-std::vector<unsigned char> head_of(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::vector<unsigned char> head(kHeaderBytes);
-  in.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(in.gcount()));
-  return head;
-}
-
-/// The largest value of a portable any-map (P1 to P6), which stands behind width and height; 0 where there is none.
-long largest_value(const std::vector<unsigned char>& head) {
-  std::array<long, 3> numbers{};
-  std::size_t at = 2;
-  for (long& number : numbers) {
-    while (at < head.size() && (std::isspace(head[at]) != 0 || head[at] == '#')) {
-      if (head[at] == '#') {
-        while (at < head.size() && head[at] != '\n') ++at;
-      } else {
-        ++at;
-      }
-    }
-    for (; at < head.size() && std::isdigit(head[at]) != 0 && number < 1000000; ++at) {
-      number = 10 * number + (head[at] - '0');
-    }
-  }
-  return numbers[2];
-}
-
-[[noreturn]] void refuse(const std::string& what) {
-  throw Error(ErrorCode::kUnsupported, what + "; store the raster as TIFF or PNG (gdal_translate does)");
-}
-
-/// OpenImageIO hands out pictures: where it would deliver other numbers than the file holds, the file is refused.
-/// `bits` are those of a sample as delivered, `stored_bits` those in the file. A photo's may be spread and rounded.
-void require_stored_numbers(const std::string& format, int bits, int stored_bits, bool is_floating, bool is_photo,
-                            const std::string& path) {
-  if (format == "fits") refuse("OpenImageIO displaces the rows of FITS images");
-  if (!is_photo && format != "pnm" && stored_bits != bits) {
-    refuse("the samples have " + std::to_string(stored_bits) + " bits, and OpenImageIO spreads them over " +
-           std::to_string(bits));
-  }
-  if (is_photo || format != "pnm") return;
-  if (bits == 16) refuse("OpenImageIO rounds the samples of any-maps of 16 bits");
-  if (!is_floating) {
-    const long largest = largest_value(head_of(path));
-    if (largest != 255) {
-      refuse("the largest value is stated as " + std::to_string(largest) +
-             ", and OpenImageIO spreads the samples over 0 to 255");
-    }
-  }
-}
-
-/// Windows narrower than the raster, or in tiles, are cut out of bands of about this size.
-constexpr std::int64_t kBandBytes = std::int64_t{8} << 20U;
 /// One row of blocks may not be larger.
 constexpr std::int64_t kMaxBlockRowBytes = std::int64_t{1} << 30U;
 
-SampleType sample_type_of(const OIIO::TypeDesc& type) {
-  switch (type.basetype) {
-    case OIIO::TypeDesc::UINT8:
-      return SampleType::kUint8;
-    case OIIO::TypeDesc::INT8:
-      return SampleType::kInt8;
-    case OIIO::TypeDesc::UINT16:
-      return SampleType::kUint16;
-    case OIIO::TypeDesc::INT16:
-      return SampleType::kInt16;
-    case OIIO::TypeDesc::UINT32:
-      return SampleType::kUint32;
-    case OIIO::TypeDesc::INT32:
-      return SampleType::kInt32;
-    case OIIO::TypeDesc::HALF:
-      return SampleType::kFloat16;
-    case OIIO::TypeDesc::FLOAT:
-      return SampleType::kFloat32;
-    case OIIO::TypeDesc::DOUBLE:
-      return SampleType::kFloat64;
-    default:
-      throw Error(ErrorCode::kUnsupported, "OpenImageIO: samples of type " + std::string(type.c_str()));
-  }
+[[noreturn]] void refuse(const std::string& what) {
+  throw Error(ErrorCode::kUnsupported, what);
 }
 
-int channel_index(const OIIO::ImageSpec& spec, const std::string& wanted) {
-  if (wanted.empty()) return 0;
-  std::string names;
-  for (int at = 0; at < spec.nchannels; ++at) {
-    const std::string name = spec.channel_name(at);
-    if (wanted == name || wanted == std::to_string(at)) return at;
-    names += (names.empty() ? "" : ", ") + name;
-  }
-  throw Error(ErrorCode::kInvalidArgument, "has no channel \"" + wanted + "\"; it has " + names + " (or 0..." +
-                                               std::to_string(spec.nchannels - 1) + ")");
+SampleType sample_type_of(const OIIO::TypeDesc& type) {
+  static const std::map<unsigned char, SampleType> types = {
+      {OIIO::TypeDesc::UINT8, SampleType::kUint8},   {OIIO::TypeDesc::INT8, SampleType::kInt8},
+      {OIIO::TypeDesc::UINT16, SampleType::kUint16}, {OIIO::TypeDesc::INT16, SampleType::kInt16},
+      {OIIO::TypeDesc::UINT32, SampleType::kUint32}, {OIIO::TypeDesc::INT32, SampleType::kInt32},
+      {OIIO::TypeDesc::HALF, SampleType::kFloat16},  {OIIO::TypeDesc::FLOAT, SampleType::kFloat32},
+      {OIIO::TypeDesc::DOUBLE, SampleType::kFloat64}};
+  const auto found = types.find(type.basetype);
+  if (found == types.end()) refuse("OpenImageIO: samples of type " + std::string(type.c_str()));
+  return found->second;
 }
 
 void check(const OIIO::ImageSpec& spec) {
@@ -143,195 +43,206 @@ void check(const OIIO::ImageSpec& spec) {
     throw Error(ErrorCode::kCorrupt, "OpenImageIO: raster of " + std::to_string(spec.width) + " x " +
                                          std::to_string(spec.height) + " samples");
   }
-  if (spec.deep) throw Error(ErrorCode::kUnsupported, "OpenImageIO: deep picture");
-  if (spec.depth > 1) throw Error(ErrorCode::kUnsupported, "OpenImageIO: volume, not a raster");
-  if (spec.get_int_attribute("oiio:Movie") != 0)
-    throw Error(ErrorCode::kUnsupported, "OpenImageIO: film, not a raster");
+  if (spec.deep) refuse("OpenImageIO: deep picture");
+  if (spec.depth > 1) refuse("OpenImageIO: volume, not a raster");
+  if (spec.get_int_attribute("oiio:Movie") != 0) refuse("OpenImageIO: film, not a raster");
   const std::int64_t rows = spec.tile_width > 0 ? spec.tile_height : 1;
-  const auto pixel_bytes = static_cast<std::int64_t>(spec.pixel_bytes(true));
+  const auto pixel_bytes = static_cast<std::int64_t>(spec.pixel_bytes());
   if (std::int64_t{spec.width} * rows > kMaxBlockRowBytes / std::max<std::int64_t>(pixel_bytes, 1)) {
-    throw Error(ErrorCode::kUnsupported, "OpenImageIO: one row of blocks is larger than 1 GiB");
+    refuse("OpenImageIO: one row of blocks is larger than 1 GiB");
   }
 }
 
-/// False where the file is of no format that OpenImageIO knows.
-bool open_raster(IsohfOiioRaster& raster, const char* path, const std::string& channel, IsohfOiioInfo& info) {
+/// OpenImageIO hands out pictures: a file is refused if it would deliver other numbers than the file has.
+void require_stored_numbers(const std::string& format, const OIIO::ImageSpec& spec) {
+  const std::string remedy = "; store the raster as TIFF or PNG (gdal_translate does)";
+  if (format == "fits") refuse("OpenImageIO displaces the rows of FITS images" + remedy);
+  if (format == "pnm" && !spec.format.is_floating_point()) {
+    refuse("OpenImageIO spreads or rounds the samples of any-maps" + remedy);
+  }
+  const auto bits = static_cast<int>(8 * spec.format.size());
+  const int stored_bits = spec.get_int_attribute("oiio:BitsPerSample", bits);
+  if (stored_bits != bits) {
+    refuse("the samples have " + std::to_string(stored_bits) + " bits, and OpenImageIO spreads them over " +
+           std::to_string(bits) + remedy);
+  }
+}
+
+std::string on_one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+/// Runs `action`, turning whatever it throws into Error that names the file.
+template <typename Action>
+auto named(const std::string& path, Action action) -> decltype(action()) {
+  try {
+    return action();
+  } catch (const Error& error) {
+    throw std::string_view(error.what()).starts_with(path) ? error : error.within(path);
+  } catch (const std::bad_alloc&) {
+    throw Error(ErrorCode::kOutOfMemory, path + ": OpenImageIO ran out of memory");
+  } catch (const std::exception& error) {
+    throw Error(ErrorCode::kCorrupt, path + ": OpenImageIO: " + on_one_line(error.what()));
+  }
+}
+
+class Picture final : public OiioPicture {
+ public:
+  Picture(const std::string& path, std::unique_ptr<OIIO::ImageInput> input)
+      : input_(std::move(input)), spec_(input_->spec()) {
+    check(spec_);
+    const bool is_tiled = spec_.tile_width > 0;
+    channels = spec_.nchannels;
+    alpha = spec_.alpha_channel;
+    const std::string space = spec_.get_string_attribute("oiio:ColorSpace");
+    is_linear = !space.empty() && (space[0] == 'l' || space[0] == 'L');
+    info_.path = path;
+    info_.format = input_->format_name();
+    info_.sample_type = sample_type_of(spec_.format);
+    info_.width = spec_.width;
+    info_.height = spec_.height;
+    info_.block_width = is_tiled ? std::min(spec_.tile_width, spec_.width) : spec_.width;
+    info_.block_height = is_tiled ? std::min(spec_.tile_height, spec_.height) : 1;
+  }
+
+  void choose_channel(const std::string& wanted) {
+    std::string names;
+    for (int at = 0; at < channels; ++at) {
+      const std::string& name = spec_.channelnames.at(static_cast<std::size_t>(at));
+      names.append(at > 0 ? ", " : "").append(name);
+      if (wanted == name || wanted == std::to_string(at)) channel_ = at;
+    }
+    if (channel_ < 0 && !wanted.empty()) {
+      throw Error(ErrorCode::kInvalidArgument, "has no channel \"" + wanted + "\"; it has " + names + " (or 0..." +
+                                                   std::to_string(channels - 1) + ")");
+    }
+    if (channel_ < 0 && channels > 1) {
+      refuse("is a picture with channels " + names + "; `channel` " + spec_.channelnames.front() + " reads one");
+    }
+    channel_ = std::max(channel_, 0);
+    if (channels > 1) info_.channel = spec_.channelnames[static_cast<std::size_t>(channel_)];
+  }
+
+  [[nodiscard]] SourceInfo& mutable_info() { return info_; }
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+  [[nodiscard]] const OIIO::ImageSpec& spec() const { return spec_; }
+
+  void read_window(const Window& window, std::span<std::byte> samples) override {
+    const std::size_t sample = spec_.format.size();
+    const std::size_t row_bytes = static_cast<std::size_t>(info_.width) * sample;
+    const std::size_t out_bytes = static_cast<std::size_t>(window.columns) * sample;
+    const std::int64_t step = info_.block_height;
+    for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
+      if (row / step != band_) named(info_.path, [&] { read_band(row / step); });
+      const std::size_t at = static_cast<std::size_t>(row % step) * row_bytes;
+      std::memcpy(samples.data(), rows_.data() + at + static_cast<std::size_t>(window.column) * sample, out_bytes);
+      samples = samples.subspan(out_bytes);
+    }
+  }
+
+  [[nodiscard]] std::uint64_t buffer_bytes() const override {
+    return static_cast<std::uint64_t>(info_.width * info_.block_height) * spec_.format.size();
+  }
+
+  void read_pixels(std::int64_t row, std::int64_t rows, std::byte* out) override {
+    named(info_.path, [&] { read_rows(row, rows, 0, channels, out); });
+  }
+
+ private:
+  /// Reads a row of blocks of the channel.
+  void read_band(std::int64_t band) {
+    band_ = -1;
+    rows_.resize(buffer_bytes());
+    const std::int64_t first = band * info_.block_height;
+    read_rows(first, std::min(info_.block_height, info_.height - first), channel_, channel_ + 1, rows_.data());
+    band_ = band;
+  }
+
+  void read_rows(std::int64_t row, std::int64_t rows, int begin, int end, std::byte* out) {
+    const int from = spec_.y + static_cast<int>(row);
+    const int to = from + static_cast<int>(rows);
+    const bool is_read = spec_.tile_width > 0
+                             ? input_->read_tiles(0, 0, spec_.x, spec_.x + spec_.width, from, to, spec_.z, spec_.z + 1,
+                                                  begin, end, spec_.format, out)
+                             : input_->read_scanlines(0, 0, from, to, spec_.z, begin, end, spec_.format, out);
+    if (is_read) return;
+    throw Error(ErrorCode::kCorrupt, "rows " + std::to_string(row) + " to " + std::to_string(row + rows - 1) + ": " +
+                                         on_one_line(input_->geterror()));
+  }
+
+  std::unique_ptr<OIIO::ImageInput> input_;
+  OIIO::ImageSpec spec_;
+  SourceInfo info_;
+  int channel_ = -1;
+  std::int64_t band_ = -1;  ///< which row of blocks is in rows_; -1: none
+  std::vector<std::byte> rows_;
+};
+
+std::unique_ptr<OIIO::ImageInput> open_input(const std::string& path) {
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);  // numbers as stored, not multiplied by alpha
   config.attribute("oiio:RawColor", 1);
-  {
-    // Of a name that says nothing OpenImageIO tries every format, DICOM among them, which reads through zeros for minutes.
-    constexpr std::uintmax_t kMostToTry = std::uintmax_t{16} << 20U;
-    static std::mutex one_at_a_time;  // the attribute is the library's
-    const std::lock_guard lock(one_at_a_time);
-    std::error_code unknown;
-    OIIO::attribute("try_all_readers", std::filesystem::file_size(path, unknown) <= kMostToTry ? 1 : 0);
-    raster.input = OIIO::ImageInput::open(path, &config);
-  }
-  if (!raster.input) {
-    const std::string why = OIIO::geterror();
-    if (why.find("could not find a format reader") != std::string::npos) return false;
-    throw Error(ErrorCode::kCorrupt, "OpenImageIO: " + why);
-  }
-  raster.spec = raster.input->spec();
-  const OIIO::ImageSpec& spec = raster.spec;
-  check(spec);
-  const auto bits = static_cast<int>(8 * spec.format.size());
-  const bool is_photo = channel == ISOHF_OIIO_PHOTO;
-  require_stored_numbers(raster.input->format_name(), bits, spec.get_int_attribute("oiio:BitsPerSample", bits),
-                         spec.format.is_floating_point(), is_photo, path);
-  raster.band_bytes = kBandBytes;
-  const bool all = is_photo || channel == ISOHF_OIIO_ALL_CHANNELS;
-  raster.channel = all ? 0 : channel_index(spec, channel);
-  raster.channels = all ? spec.nchannels : 1;
-  raster.type = all ? spec.format : spec.channelformat(raster.channel);
-  const std::string space = spec.get_string_attribute("oiio:ColorSpace");
-  info.channels = raster.channels;
-  info.alpha = spec.alpha_channel;
-  info.is_linear = !space.empty() && (space[0] == 'l' || space[0] == 'L') ? 1 : 0;
-  info.width = spec.width;
-  info.height = spec.height;
-  info.block_width = spec.tile_width > 0 ? std::min(spec.tile_width, spec.width) : spec.width;
-  info.block_height = spec.tile_width > 0 ? std::min(spec.tile_height, spec.height) : 1;
-  info.sample_type = static_cast<int32_t>(sample_type_of(raster.type));
-  put_text(info.format, raster.input->format_name());
-  std::string warning;
-  if (spec.nchannels > 1 && !all) put_text(info.channel, spec.channel_name(raster.channel));
-  if (spec.nchannels > 1 && channel.empty()) {
-    warning = "channel " + std::string(spec.channel_name(0)) + " is read, of " + std::to_string(spec.nchannels);
-  }
-  put_text(info.warning, warning);
-  return true;
+  // Of a name that says nothing OpenImageIO tries every format, DICOM among them, which reads through zeros for
+  // minutes.
+  constexpr std::uintmax_t kMostToTry = std::uintmax_t{16} << 20U;
+  static std::mutex one_at_a_time;  // the attribute is the library's
+  const std::lock_guard lock(one_at_a_time);
+  std::error_code unknown;
+  OIIO::attribute("try_all_readers", std::filesystem::file_size(path, unknown) <= kMostToTry ? 1 : 0);
+  std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path, &config);
+  if (input) return input;
+  const std::string why = OIIO::geterror();
+  if (why.find("could not find a format reader") != std::string::npos) return nullptr;
+  throw Error(ErrorCode::kCorrupt, "OpenImageIO: " + on_one_line(why));
 }
 
-/// Reads whole rows [begin, end) of the channel into `out`; in a tiled file begin and end lie between tiles.
-void read_rows(IsohfOiioRaster& raster, int begin, int end, void* out) {
-  const OIIO::ImageSpec& spec = raster.spec;
-  const int from = spec.y + begin;
-  const int to = spec.y + end;
-  const bool done = spec.tile_width > 0
-                        ? raster.input->read_tiles(0, 0, spec.x, spec.x + spec.width, from, to, spec.z, spec.z + 1,
-                                                   raster.channel, raster.channel + raster.channels, raster.type, out)
-                        : raster.input->read_scanlines(0, 0, from, to, spec.z, raster.channel,
-                                                       raster.channel + raster.channels, raster.type, out);
-  if (done) return;
-  throw Error(ErrorCode::kCorrupt,
-              "rows " + std::to_string(begin) + " to " + std::to_string(end - 1) + ": " + raster.input->geterror());
-}
-
-/// Of all channels that are delivered.
-std::size_t pixel_bytes(const IsohfOiioRaster& raster) {
-  return raster.type.size() * static_cast<std::size_t>(raster.channels);
-}
-
-/// Rows of blocks that a band has room for, at least one.
-std::int64_t band_rows(const IsohfOiioRaster& raster, std::int64_t bytes) {
-  const std::int64_t step = raster.spec.tile_width > 0 ? raster.spec.tile_height : 1;
-  const std::int64_t row_bytes = std::int64_t{raster.spec.width} * static_cast<std::int64_t>(pixel_bytes(raster));
-  return std::max(bytes / row_bytes / step * step, step);
-}
-
-void read_window(IsohfOiioRaster& raster, int column, int row, int columns, int rows, unsigned char* out) {
-  const OIIO::ImageSpec& spec = raster.spec;
-  const bool tiled = spec.tile_width > 0;
-  if (!tiled && columns == spec.width) return read_rows(raster, row, row + rows, out);
-  const std::size_t size = pixel_bytes(raster);
-  const std::size_t row_bytes = static_cast<std::size_t>(spec.width) * size;
-  const std::size_t out_bytes = static_cast<std::size_t>(columns) * size;
-  const std::int64_t step = tiled ? spec.tile_height : 1;
-  const std::int64_t most_rows = band_rows(raster, raster.band_bytes);
-  const int end = row + rows;
-  while (row < end) {
-    const auto begin = static_cast<int>(row / step * step);
-    const std::int64_t wanted = (end - begin + step - 1) / step * step;
-    const auto stop = static_cast<int>(std::min<std::int64_t>(begin + std::min(wanted, most_rows), spec.height));
-    raster.band.resize(static_cast<std::size_t>(stop - begin) * row_bytes);
-    read_rows(raster, begin, stop, raster.band.data());
-    for (; row < std::min(stop, end); ++row, out += out_bytes) {
-      std::memcpy(out,
-                  raster.band.data() + static_cast<std::size_t>(row - begin) * row_bytes +
-                      static_cast<std::size_t>(column) * size,
-                  out_bytes);
-    }
-  }
-}
-
-int module_open(const char* path, const char* channel, IsohfOiioRaster** raster, IsohfOiioInfo* info,
-                IsohfOiioMessage* message) {
-  bool known = true;
-  const int result = guarded(message, [&] {
-    auto opened = std::make_unique<IsohfOiioRaster>();
-    *info = {};
-    known = open_raster(*opened, path, channel, *info);
-    if (known) *raster = opened.release();
-  });
-  return known ? result : ISOHF_OIIO_UNKNOWN;
-}
-
-int module_read(IsohfOiioRaster* raster, int64_t column, int64_t row, int64_t columns, int64_t rows, void* samples,
-                size_t bytes, IsohfOiioMessage* message) {
-  return guarded(message, [&] {
-    if (static_cast<size_t>(columns * rows) * pixel_bytes(*raster) != bytes) {
-      throw Error(ErrorCode::kInvalidArgument, "the window and its buffer differ in size");
-    }
-    read_window(*raster, static_cast<int>(column), static_cast<int>(row), static_cast<int>(columns),
-                static_cast<int>(rows), static_cast<unsigned char*>(samples));
+std::unique_ptr<OiioPicture> open_picture(const std::string& path, OiioPlugin::For use, const std::string& channel,
+                                          const std::function<void(SourceInfo& info)>& complete) {
+  return named(path, [&]() -> std::unique_ptr<OiioPicture> {
+    std::unique_ptr<OIIO::ImageInput> input = open_input(path);
+    if (!input) return nullptr;
+    auto picture = std::make_unique<Picture>(path, std::move(input));
+    if (use == OiioPlugin::For::kPhoto) return picture;
+    require_stored_numbers(picture->info().format, picture->spec());
+    picture->choose_channel(channel);
+    complete(picture->mutable_info());
+    return picture;
   });
 }
 
-void module_bound(IsohfOiioRaster* raster, int64_t bytes) {
-  raster->band_bytes = std::min(kBandBytes, bytes);
-  raster->band = {};
+std::string library() {
+  const int version = OIIO::openimageio_version();
+  return "OpenImageIO " + std::to_string(version / 10000) + "." + std::to_string(version / 100 % 100) + "." +
+         std::to_string(version % 100);
 }
 
-int64_t module_buffer_bytes(const IsohfOiioRaster* raster, int64_t bytes) {
-  const OIIO::ImageSpec& spec = raster->spec;
-  return std::min<std::int64_t>(band_rows(*raster, std::min(kBandBytes, bytes)), spec.height) * spec.width *
-         static_cast<std::int64_t>(pixel_bytes(*raster));
-}
-
-void module_close(IsohfOiioRaster* raster) {
-  delete raster;
-}
-
-const char* module_library() {
-  static const std::string text = "OpenImageIO " + std::to_string(OIIO::openimageio_version() / 10000) + "." +
-                                  std::to_string(OIIO::openimageio_version() / 100 % 100) + "." +
-                                  std::to_string(OIIO::openimageio_version() % 100);
-  return text.c_str();
+/// `text` between two of `c`.
+std::string between(char c, const std::string& text) {
+  std::string all(1, c);
+  all.append(text).push_back(c);
+  return all;
 }
 
 /// OpenImageIO has them as "bmp:bmp,dib;cineon:cin;...", formats that it only writes as well.
-const char* module_extensions() {
-  static const std::string text = [] {
-    std::string readable(1, ',');
-    readable += std::string(OIIO::get_string_attribute("input_format_list"));
-    readable += ',';
-    const std::string all{OIIO::get_string_attribute("extension_list")};
-    std::string list;
-    for (std::size_t at = 0; at < all.size();) {
-      const std::size_t end = std::min(all.find(';', at), all.size());
-      const std::size_t colon = std::min(all.find(':', at), end);
-      std::string name(1, ',');
-      name.append(all, at, colon - at);
-      name += ',';
-      if (readable.find(name) != std::string::npos && colon < end) {
-        std::string extensions = all.substr(colon + 1, end - colon - 1);
-        std::replace(extensions.begin(), extensions.end(), ',', ' ');
-        if (!list.empty()) list += ' ';
-        list += extensions;
-      }
-      at = end + 1;
-    }
-    return list;
-  }();
-  return text.c_str();
+std::vector<std::string> extensions() {
+  const std::string readable = between(',', std::string(OIIO::get_string_attribute("input_format_list")));
+  std::vector<std::string> list;
+  std::istringstream formats{std::string(OIIO::get_string_attribute("extension_list"))};
+  for (std::string format; std::getline(formats, format, ';');) {
+    const std::size_t colon = format.find(':');
+    if (colon == std::string::npos || readable.find(between(',', format.substr(0, colon))) == std::string::npos)
+      continue;
+    std::istringstream names(format.substr(colon + 1));
+    for (std::string name; std::getline(names, name, ',');) list.push_back(std::string(1, '.').append(name));
+  }
+  return list;
 }
 
 }  // namespace
+}  // namespace isohf
 
-extern "C" __attribute__((visibility("default"))) const IsohfOiioModule* isohf_oiio_module() {
-  static const IsohfOiioModule module = {ISOHF_OIIO_ABI,      module_open,  module_read,    module_bound,
-                                         module_buffer_bytes, module_close, module_library, module_extensions};
-  return &module;
+extern "C" __attribute__((visibility("default"))) const isohf::OiioPlugin* isohf_oiio_plugin() {
+  static const isohf::OiioPlugin plugin = {isohf::kOiioAbi, isohf::open_picture, isohf::library, isohf::extensions};
+  return &plugin;
 }

@@ -1,13 +1,11 @@
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <cstdio>
 #include <memory>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "formats/photo/photo.h"
 #include "isohf/base/jpeg_errors.h"
-#include "isohf/error.h"
 
 namespace isohf {
 namespace {
@@ -36,116 +34,91 @@ int exif_orientation(std::span<const unsigned char> data) {
   return 1;
 }
 
-/// The functions that call libjpeg hold nothing that a jump could leak.
-bool read_header(jpeg_decompress_struct& jpeg, JpegErrors& errors, std::FILE* file) {
-  if (setjmp(errors.jump) != 0) return false;  // NOLINT(cert-err52-cpp): libjpeg's way to return errors
-  jpeg_create_decompress(&jpeg);
-  jpeg_stdio_src(&jpeg, file);
-  jpeg_save_markers(&jpeg, kExif, 0xFFFF);
-  jpeg_read_header(&jpeg, TRUE);
-  return true;
-}
-
-bool start(jpeg_decompress_struct& jpeg, JpegErrors& errors) {
-  if (setjmp(errors.jump) != 0) return false;  // NOLINT(cert-err52-cpp)
-  jpeg.dct_method = JDCT_ISLOW;
-  const bool has_ink = jpeg.num_components == 4;
-  jpeg.out_color_space = jpeg.num_components == 1 ? JCS_GRAYSCALE : has_ink ? JCS_CMYK : JCS_RGB;
-  return jpeg_start_decompress(&jpeg) != FALSE;
-}
-
-bool read_row(jpeg_decompress_struct& jpeg, JpegErrors& errors, unsigned char* row) {
-  if (setjmp(errors.jump) != 0) return false;  // NOLINT(cert-err52-cpp)
-  if (jpeg_read_scanlines(&jpeg, &row, 1) != 1) return false;
-  if (jpeg.output_scanline == jpeg.output_height) jpeg_finish_decompress(&jpeg);
-  return true;
-}
-
-class JpegRows final : public PhotoRows {
+/// libjpeg's, of 8 bits: grey, or RGB, also of CMYK.
+class JpegDecoder final : public PictureDecoder {
  public:
-  explicit JpegRows(PhotoInfo& info) : path_(info.path) {
-    restart();
-    info.format = "jpeg";
-    info.width = jpeg_->image_width;
-    info.height = jpeg_->image_height;
-    // CMYK becomes RGB.
-    info.channels = jpeg_->num_components == 4 ? 3 : photo_channels(jpeg_->num_components, -1, info);
-    for (const jpeg_marker_struct* marker = jpeg_->marker_list; marker != nullptr; marker = marker->next) {
-      if (marker->marker != kExif) continue;
-      const int orientation = exif_orientation({marker->data, marker->data_length});
-      if (orientation >= 1 && orientation <= 8) note_orientation(orientation, info);
-    }
-    begin();
-  }
-  ~JpegRows() override { close(); }
+  ~JpegDecoder() override { jpeg_destroy_decompress(&jpeg_); }
 
-  void read(std::int64_t row, std::int64_t rows, std::span<std::uint8_t> samples) override {
-    if (jpeg_ == nullptr || row < next_row_) {
-      restart();
-      begin();
+  [[nodiscard]] int orientation() const {
+    for (const jpeg_marker_struct* marker = jpeg_.marker_list; marker != nullptr; marker = marker->next) {
+      if (marker->marker == kExif) return exif_orientation({marker->data, marker->data_length});
     }
-    const std::size_t out_bytes = samples.size() / static_cast<std::size_t>(rows);
-    const bool has_ink = jpeg_->num_components == 4;
-    for (; next_row_ < row + rows; ++next_row_) {
-      if (!read_row(*jpeg_, errors_, row_.data())) fail(fmt::format("JPEG row {}", next_row_));
-      if (next_row_ < row) continue;
-      std::uint8_t* const out = samples.data() + static_cast<std::size_t>(next_row_ - row) * out_bytes;
-      if (!has_ink) {
-        std::copy(row_.begin(), row_.end(), out);
-        continue;
-      }
-      // Adobe's programs, which write such files, store what is left of the light.
-      for (std::size_t i = 0; i < out_bytes; ++i) {
-        const unsigned ink = row_[i / 3 * 4 + i % 3];
-        const unsigned black = row_[i / 3 * 4 + 3];
-        out[i] = static_cast<std::uint8_t>((ink * black + 127) / 255);
-      }
+    return 1;
+  }
+
+  [[nodiscard]] bool start(PngHeader& /*header*/, For /*use*/) override {
+    const bool is_started = run([&] {
+      jpeg_.dct_method = JDCT_ISLOW;
+      jpeg_.out_color_space = has_ink() ? JCS_CMYK : jpeg_.num_components == 1 ? JCS_GRAYSCALE : JCS_RGB;
+      jpeg_start_decompress(&jpeg_);
+    });
+    if (is_started && has_ink()) inks_.resize(std::size_t{4} * jpeg_.output_width);
+    return is_started;
+  }
+
+  [[nodiscard]] bool read_row(std::span<std::byte> row) override {
+    auto* const samples = reinterpret_cast<unsigned char*>(row.data());
+    JSAMPROW out = has_ink() ? inks_.data() : samples;
+    if (!run([&] { jpeg_read_scanlines(&jpeg_, &out, 1); })) return false;
+    // Adobe's programs, which write such files, store what is left of the light.
+    for (std::size_t i = 0; i < row.size() && has_ink(); ++i) {
+      const unsigned ink = inks_[i / 3 * 4 + i % 3];
+      samples[i] = static_cast<unsigned char>((ink * inks_[i / 3 * 4 + 3] + 127) / 255);
     }
+    return true;
+  }
+
+  [[nodiscard]] bool read_picture(std::span<std::byte> /*picture*/, const PngHeader& /*header*/) override {
+    return false;
+  }
+
+  [[nodiscard]] bool finish() override {
+    return run([&] { jpeg_finish_decompress(&jpeg_); });
   }
 
  private:
-  void restart() {
-    close();
-    next_row_ = 0;
-    file_.reset(std::fopen(path_.c_str(), "rb"));
-    if (!file_) throw Error(ErrorCode::kIo, "cannot be opened");
-    jpeg_ = std::make_unique<jpeg_decompress_struct>();
-    jpeg_->err = &errors_.base;
-    if (!read_header(*jpeg_, errors_, file_.get())) fail("JPEG header");
+  /// Runs calls of libjpeg, which leaves a failed one by longjmp: they hold nothing but trivial objects.
+  template <typename Calls>
+  [[nodiscard]] bool run(Calls calls) {
+    if (setjmp(errors_.jump) != 0) return fail(errors_.text.data());  // NOLINT(cert-err52-cpp)
+    calls();
+    return true;
   }
 
-  void begin() {
-    if (!start(*jpeg_, errors_)) fail("JPEG header");
-    row_.resize(std::size_t{jpeg_->output_width} * static_cast<std::size_t>(jpeg_->output_components));
+  [[nodiscard]] bool has_ink() const { return jpeg_.num_components == 4; }
+
+  [[nodiscard]] bool read_header(PngHeader& header) override {
+    jpeg_destroy_decompress(&jpeg_);
+    jpeg_.err = &errors_.base;
+    const bool is_read = run([&] {
+      jpeg_create_decompress(&jpeg_);
+      jpeg_stdio_src(&jpeg_, file());
+      jpeg_save_markers(&jpeg_, kExif, 0xFFFF);
+      jpeg_read_header(&jpeg_, TRUE);
+    });
+    if (!is_read) return false;
+    header.width = jpeg_.image_width;
+    header.height = jpeg_.image_height;
+    header.bit_depth = 8;
+    header.channels.resize(has_ink() ? 3 : static_cast<std::size_t>(jpeg_.num_components));
+    header.row_bytes = header.width * header.channels.size();
+    return true;
   }
 
-  void close() {
-    if (jpeg_) jpeg_destroy_decompress(jpeg_.get());
-    jpeg_.reset();
-  }
-
-  /// The decoder cannot go on after an error: the next row, whichever, begins again.
-  [[noreturn]] void fail(const std::string& where) {
-    close();
-    throw Error(ErrorCode::kCorrupt, fmt::format("{}: {}", where, errors_.text.data()));
-  }
-
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
-
-  std::string path_;
   JpegErrors errors_;
-  std::unique_ptr<std::FILE, Close> file_;
-  std::unique_ptr<jpeg_decompress_struct> jpeg_;
-  std::int64_t next_row_ = 0;
-  std::vector<unsigned char> row_;
+  jpeg_decompress_struct jpeg_{};
+  std::vector<unsigned char> inks_;  ///< a row of CMYK
 };
 
 }  // namespace
 
 std::unique_ptr<PhotoRows> open_jpeg_rows(PhotoInfo& info) {
-  return std::make_unique<JpegRows>(info);
+  info.format = "jpeg";
+  auto decoder = std::make_unique<JpegDecoder>();
+  const JpegDecoder& opened = *decoder;
+  auto rows = std::make_unique<DecodedRows>(info, "JPEG", std::move(decoder));
+  note_orientation(opened.orientation(), info);
+  return rows;
 }
 
 }  // namespace isohf

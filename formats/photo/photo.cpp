@@ -11,7 +11,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "formats/georeference/files_beside.h"
+#include "formats/georeference/sidecars.h"
 #include "formats/io/block_cache.h"
 #include "formats/io/raw_file.h"
 #include "formats/readers.h"
@@ -25,11 +25,6 @@ namespace {
 
 /// Rows that are decoded and cached together where the file has no blocks.
 constexpr std::int64_t kBandRows = 64;
-
-/// Readers of TIFF name the path themselves.
-Error naming(const std::string& path, const Error& error) {
-  return std::string_view(error.what()).starts_with(path + ": ") ? error.at(path) : error.within(path);
-}
 
 /// Keeps bands of whole rows.
 class CachedPhoto final : public PhotoSource {
@@ -95,10 +90,11 @@ class CachedPhoto final : public PhotoSource {
 };
 
 std::unique_ptr<PhotoRows> open_rows(PhotoInfo& info) {
-  std::array<std::byte, 8> bytes{};
+  std::array<std::byte, 16> bytes{};
   const std::span head(bytes.data(), RawFile(info.path).read_some(0, bytes));
-  if (looks_like_png(head)) return open_png_rows(info);
-  if (looks_like_tiff(head)) return open_tiff_rows(info);
+  if (kPngFormat.recognises(head)) return open_png_rows(info);
+  if (looks_like_webp(head)) return open_webp_rows(info);
+  if (kTiffFormat.recognises(head)) return open_tiff_rows(info);
   constexpr std::array<std::byte, 3> kJpeg = {std::byte{0xFF}, std::byte{0xD8}, std::byte{0xFF}};
   if (head.size() > kJpeg.size() && std::equal(kJpeg.begin(), kJpeg.end(), head.begin())) return open_jpeg_rows(info);
   return open_oiio_rows(info);
@@ -129,7 +125,7 @@ int photo_channels(int stored, int alpha, PhotoInfo& info) {
 }
 
 void note_orientation(int orientation, PhotoInfo& info) {
-  if (orientation == 1) return;
+  if (orientation <= 1 || orientation > 8) return;
   info.warnings.push_back(fmt::format(
       "{}: the photo's orientation tag is ignored: its first row is taken to be the northernmost", info.path));
 }

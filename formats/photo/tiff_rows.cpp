@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "formats/geotiff/geotiff_keys.h"
 #include "formats/geotiff/tiff_blocks.h"
 #include "formats/geotiff/tiff_file.h"
-#include "formats/io/raw_file.h"
 #include "formats/photo/photo.h"
 #include "isohf/error.h"
 
@@ -37,48 +37,31 @@ SampleType sample_type_of(const TiffLayout& layout) {
                      bits));
 }
 
-/// Interleaved samples of a pixel as columns of their own, so that one reader delivers all.
-TiffLayout spread(TiffLayout layout) {
-  layout.width *= layout.interleaved();
-  layout.block_width *= layout.interleaved();
-  if (!layout.separate) layout.samples_per_pixel = 1;
-  return layout;
-}
-
 class TiffRows final : public PhotoRows {
  public:
-  explicit TiffRows(PhotoInfo& info) : file_(info.path) {
-    TiffMainImage image = open_main_image(file_);
+  explicit TiffRows(PhotoInfo& info) {
+    TiffMainImage image = open_main_image(info.path);
     const TiffLayout layout = image.handle->read_layout();
     describe(*image.handle, layout, info);
-    const std::uint32_t directory = image.directories.main;
-    const int planes = layout.separate ? kept_ : 1;
-    planes_.push_back(std::make_unique<TiffBlocks>(file_, spread(layout), std::move(image), 0));
-    for (int plane = 1; plane < planes; ++plane) {
-      planes_.push_back(std::make_unique<TiffBlocks>(file_, spread(layout), open_image(file_, directory), plane));
-    }
     info.random_access = layout.tiled || layout.block_height < layout.height;
-    const std::int64_t unit = planes_.front()->unit_rows();
+    const std::int64_t unit = layout.block_height;
     info.block_height = std::min(std::max<std::int64_t>(info.block_height / unit, 1) * unit, layout.height);
-    for (const auto& blocks : planes_) blocks->limit_cache(0);  // whole rows of blocks are read
     width_ = layout.width;
+    constexpr std::uint64_t kNoCache = 0;  // whole rows of blocks are read
+    blocks_.emplace(info.path, layout, std::move(image), TiffBlocks::kAllSamples, kNoCache);
   }
 
   void read(std::int64_t row, std::int64_t rows, std::span<std::uint8_t> samples) override {
-    if (planes_.size() == 1 && palette_.empty()) {
-      read_plane(0, row, rows, stored_, kept_, samples);
-    } else {
-      plane_.resize(static_cast<std::size_t>(width_ * rows));
-      for (std::size_t channel = 0; channel < planes_.size(); ++channel) {
-        read_plane(channel, row, rows, 1, 1, plane_);
-        for (std::size_t i = 0; i < plane_.size() && palette_.empty(); ++i) {
-          samples[i * planes_.size() + channel] = plane_[i];
-        }
+    raw_.resize(static_cast<std::size_t>(width_ * stored_ * rows) * size_bytes(type_));
+    blocks_->read({0, row, width_, rows}, raw_);
+    if (!palette_.empty()) {
+      for (std::size_t i = 0; i < raw_.size(); ++i) {
+        std::ranges::copy(palette_[std::to_integer<std::size_t>(raw_[i])],
+                          samples.begin() + static_cast<std::ptrdiff_t>(3 * i));
       }
-      for (std::size_t i = 0; i < plane_.size() && !palette_.empty(); ++i) {
-        std::copy_n(palette_[plane_[i]].begin(), 3, samples.begin() + static_cast<std::ptrdiff_t>(3 * i));
-      }
+      return;
     }
+    photo_samples(type_, raw_, stored_, kept_, false, samples);
     if (!inverted_) return;
     for (std::uint8_t& sample : samples) sample = static_cast<std::uint8_t>(255 - sample);
   }
@@ -105,22 +88,14 @@ class TiffRows final : public PhotoRows {
     info.channels = palette_.empty() ? kept_ : 3;
     note_orientation(layout.orientation, info);
     const GeoTiffPlace place = place_from_geotiff(handle.read_tags().geo, layout.height);
-    if (!place.placed || !place.georeference.has_origin) return;
+    if (!place.georeference.has_origin) return;
     if (place.rows_from_south) {
       throw Error(ErrorCode::kUnsupported, "its rows run from South to North; turn it first");
     }
     info.georeference = place.georeference;
   }
 
-  void read_plane(std::size_t plane, std::int64_t row, std::int64_t rows, int stored, int kept,
-                  std::span<std::uint8_t> samples) {
-    raw_.resize(static_cast<std::size_t>(width_ * stored * rows) * size_bytes(type_));
-    planes_[plane]->read({0, row, width_ * stored, rows}, raw_);
-    photo_samples(type_, raw_, stored, kept, false, samples);
-  }
-
-  RawFile file_;
-  std::vector<std::unique_ptr<TiffBlocks>> planes_;
+  std::optional<TiffBlocks> blocks_;
   std::int64_t width_ = 0;
   int stored_ = 0;  ///< samples of a pixel
   int kept_ = 0;
@@ -128,7 +103,6 @@ class TiffRows final : public PhotoRows {
   SampleType type_ = SampleType::kUint8;
   std::vector<std::array<std::uint8_t, 3>> palette_;
   std::vector<std::byte> raw_;
-  std::vector<std::uint8_t> plane_;  ///< one channel, or places in the palette
 };
 
 }  // namespace

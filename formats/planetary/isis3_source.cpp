@@ -1,7 +1,3 @@
-#include "formats/readers.h"
-#include "isohf/projection/body.h"
-#include "isohf/projection/length_unit.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,263 +5,180 @@
 #include <bit>
 #include <cctype>
 #include <cstring>
-#include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
-#include "formats/georeference/files_beside.h"
-#include "formats/georeference/map_wkt.h"
+#include "formats/georeference/sidecars.h"
+#include "formats/grids/described_source.h"
 #include "formats/io/bands.h"
-#include "formats/io/file_source.h"
-#include "formats/open_options.h"
 #include "formats/planetary/label_text.h"
-#include "isohf/base/bytes.h"
+#include "formats/planetary/planetary_system.h"
+#include "formats/readers.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
 namespace isohf {
 namespace {
 
-constexpr std::int64_t kPieceBytes = std::int64_t{1} << 20;
-
 struct PixelType {
-  const char* name;
+  std::string_view name;
   SampleType type;
   double null;       ///< what lies outside of the next two is special as well
   double valid_min;  ///< ISIS, SpecialPixel.h
   double valid_max;
 };
 
-const std::array<PixelType, 5>& pixel_types() {
-  static const std::array<PixelType, 5> types = {{
-      {"UNSIGNEDBYTE", SampleType::kUint8, 0.0, 1.0, 254.0},
-      {"SIGNEDWORD", SampleType::kInt16, -32768.0, -32752.0, 32767.0},
-      {"UNSIGNEDWORD", SampleType::kUint16, 0.0, 3.0, 65522.0},
-      {"UNSIGNEDINTEGER", SampleType::kUint32, 0.0, 3.0, 4294967282.0},
-      {"REAL", SampleType::kFloat32, static_cast<double>(std::bit_cast<float>(0xFF7FFFFBU)),
-       static_cast<double>(std::bit_cast<float>(0xFF7FFFFAU)), static_cast<double>(std::bit_cast<float>(0x7F7FFFFFU))},
-  }};
-  return types;
+constexpr double real(std::uint32_t bits) {
+  return std::bit_cast<float>(bits);
 }
 
-/// A positive length in metres, which are meant where no unit stands there; "meters/pixel" counts as metres.
-std::optional<double> metres_by_default(const LabelFields& fields, const char* key) {
-  const std::optional<double> number = fields.number(key);
-  const std::string unit = fields.unit(key);
-  const std::optional<LinearUnit> length = linear_unit(unit.empty() ? "m" : unit.substr(0, unit.find('/')));
-  return number && length ? std::optional(*number * length->metres) : std::nullopt;
+constexpr std::array<PixelType, 5> kPixelTypes = {{
+    {"UNSIGNEDBYTE", SampleType::kUint8, 0.0, 1.0, 254.0},
+    {"SIGNEDWORD", SampleType::kInt16, -32768.0, -32752.0, 32767.0},
+    {"UNSIGNEDWORD", SampleType::kUint16, 0.0, 3.0, 65522.0},
+    {"UNSIGNEDINTEGER", SampleType::kUint32, 0.0, 3.0, 4294967282.0},
+    {"REAL", SampleType::kFloat32, real(0xFF7FFFFBU), real(0xFF7FFFFAU), real(0x7F7FFFFFU)},
+}};
+
+/// The file that holds the samples: that of the label, or one beside it.
+std::string core_file(const std::string& path, const LabelBlock& core) {
+  if (core.entry("^CORE") == nullptr) return path;
+  const std::string name = core.text("^CORE").value_or("");
+  const std::string found = name.find('/') == std::string::npos ? file_beside(path, name) : std::string();
+  if (!found.empty()) return found;
+  throw Error(ErrorCode::kIo, fmt::format("{}: label line {}: ^Core names {}, which must be a file beside the label",
+                                          path, core.entry("^CORE")->line, name));
 }
 
-class Isis3Source final : public FileSource {
+class Isis3Source final : public DescribedSource {
  public:
-  Isis3Source(const std::string& path, const OpenOptions& options) : FileSource(path, "ISIS3 cube") {
-    const LabelText label = read_label(path, options.unpacked_bytes);
-    const LabelBlock& cube = inner(label.root, "ISISCUBE");
-    read_core(inner(cube, "CORE"), label.end_bytes, options.unpacked_bytes);
-    read_mapping(cube);
-    first_bytes_ += static_cast<std::uint64_t>(choose_band(info_, options, bands_)) * band_bytes_;
-    apply_open_options(info_, options);
+  Isis3Source(const std::string& path, const LabelText& label, const OpenOptions& options)
+      : DescribedSource(core_file(path, label.root.inner("ISISCUBE").inner("CORE")), "ISIS3 cube", path) {
+    const LabelBlock& cube = label.root.inner("ISISCUBE");
+    const LabelBlock& core = cube.inner("CORE");
+    read_pixels(core.inner("PIXELS"));
+    read_tiles(core, core.entry("^CORE") == nullptr ? label.end_bytes : 0, options);
+    const auto groups = cube.all("MAPPING");
+    if (!groups.empty()) read_mapping(*groups.front());
+    finish(options, 0);
+    const bool has_whole_rows = tile_.width >= info_.width;
+    info_.block_width = has_whole_rows ? info_.width : tile_.width;
+    info_.block_height = has_whole_rows ? 1 : std::min(tile_.height, info_.height);
   }
 
   void read_window(const Window& window, std::span<std::byte> samples) override {
     ISOHF_ASSERT(is_window_of(info_, window, samples.size()));
-    for (std::int64_t row = window.row; row < window.row + window.rows;) {
-      const std::int64_t rows = std::min(window.row + window.rows, (row / tile_rows_ + 1) * tile_rows_) - row;
-      for (std::int64_t column = window.column; column < window.column + window.columns;) {
-        const std::int64_t columns =
-            std::min(window.column + window.columns, (column / tile_columns_ + 1) * tile_columns_) - column;
-        read_part({column, row, columns, rows}, window, samples);
-        column += columns;
+    const auto size = static_cast<std::int64_t>(size_bytes(info_.sample_type));
+    const std::int64_t row_bytes = window.columns * size;
+    const auto tile_bytes = static_cast<std::uint64_t>(tile_.width * tile_.height * size);
+    Window part;  // in the raster, and in its tile
+    for (std::int64_t row = window.row; row < window.row + window.rows; row += part.rows) {
+      for (std::int64_t column = window.column; column < window.column + window.columns; column += part.columns) {
+        const std::int64_t tile = row / tile_.height * tiles_across_ + column / tile_.width;
+        part = {column % tile_.width, row % tile_.height, 0, 0};
+        part.columns = std::min(window.column + window.columns - column, tile_.width - part.column);
+        part.rows = std::min(window.row + window.rows - row, tile_.height - part.row);
+        PlainLayout layout = layout_;
+        layout.offset_bytes += static_cast<std::uint64_t>(tile) * tile_bytes;
+        std::byte* const to = samples.data() + (row - window.row) * row_bytes + (column - window.column) * size;
+        const auto bytes = static_cast<std::size_t>(part.columns * part.rows * size);
+        if (part.columns == window.columns) {  // its rows follow each other
+          read_plain_samples(*file_, tile_, layout, part, {to, bytes});
+          continue;
+        }
+        piece_.resize(bytes);
+        read_plain_samples(*file_, tile_, layout, part, piece_);
+        const auto run = static_cast<std::size_t>(part.columns * size);
+        for (std::int64_t i = 0; i < part.rows; ++i)
+          std::memcpy(to + i * row_bytes, piece_.data() + static_cast<std::size_t>(i) * run, run);
       }
-      row += rows;
     }
-    if (big_endian_) swap_byte_order(samples, static_cast<std::size_t>(size_));
   }
 
  private:
-  [[nodiscard]] const LabelBlock& inner(const LabelBlock& block, const char* name) const {
-    for (const LabelBlock& each : block.blocks) {
-      if (each.name == name) return each;
-    }
-    throw Error(ErrorCode::kCorrupt, fmt::format("{}: label line {}: there is no {} in {}", info_.path, block.line,
-                                                 name, block.name.empty() ? "the label" : block.name));
-  }
-
-  void read_core(const LabelBlock& core, std::uint64_t label_bytes, std::uint64_t unpacked_bytes) {
-    const LabelFields fields(info_.path, core);
-    std::uint64_t first_free = label_bytes;
-    std::string data_path = info_.path;
-    if (core.entry("^CORE") != nullptr) {
-      data_path = core_file(fields, core.entry("^CORE")->line);
-      first_free = 0;
-    }
-    file_.emplace(data_path, unpacked_bytes);
-    const LabelFields dimensions(info_.path, inner(core, "DIMENSIONS"));
-    info_.width = dimensions.count("SAMPLES", 1, kMostSamples);
-    info_.height = dimensions.count("LINES", 1, kMostSamples);
-    bands_ = dimensions.count("BANDS", 1, kMostBands, 1);
-    read_pixels(LabelFields(info_.path, inner(core, "PIXELS")));
-    const std::string format = fields.word("FORMAT").value_or("");
-    if (format == "TILE") {
-      tile_columns_ = fields.count("TILESAMPLES", 1, kMostSamples);
-      tile_rows_ = fields.count("TILELINES", 1, kMostSamples);
-    } else if (format == "BANDSEQUENTIAL") {
-      tile_columns_ = info_.width;
-      tile_rows_ = info_.height;
-    } else {
-      fields.refuse("FORMAT", "Tile or BandSequential");
-    }
-    tiles_across_ = (info_.width + tile_columns_ - 1) / tile_columns_;
-    const std::int64_t tiles_down = (info_.height + tile_rows_ - 1) / tile_rows_;
-    const double total = static_cast<double>(tiles_across_ * tile_columns_) *
-                         static_cast<double>(tiles_down * tile_rows_) * static_cast<double>(size_ * bands_);
-    first_bytes_ = static_cast<std::uint64_t>(fields.count("STARTBYTE", 1, std::int64_t{1} << 50)) - 1;
-    if (first_bytes_ < first_free) {
-      fields.refuse("STARTBYTE", fmt::format("behind the label, which has {} bytes", first_free));
-    }
-    const auto wanted = static_cast<double>(first_bytes_) + total;
-    if (!(wanted < kMostBytes) || static_cast<double>(file_->size_bytes()) < wanted) {
-      throw Error(ErrorCode::kCorrupt,
-                  fmt::format("{}: ends early: {} bytes, {} x {} samples in {} bands need {:.0f}", data_path,
-                              file_->size_bytes(), info_.width, info_.height, bands_, wanted));
-    }
-    band_bytes_ = static_cast<std::uint64_t>(tiles_across_ * tiles_down * tile_columns_ * tile_rows_ * size_);
-    info_.block_width = tile_columns_;
-    info_.block_height = format == "TILE" ? std::min(tile_rows_, info_.height) : 1;
-    if (tile_columns_ >= info_.width) {
-      info_.block_width = info_.width;
-      info_.block_height = 1;  // rows follow each other
-    }
-  }
-
-  /// The file beside the label that holds the samples.
-  [[nodiscard]] std::string core_file(const LabelFields& core, int line) const {
-    const std::string name = core.text("^CORE").value_or("");
-    const std::string found = name.find('/') == std::string::npos ? file_beside(info_.path, name) : std::string();
-    if (!found.empty()) return found;
-    throw Error(ErrorCode::kIo, fmt::format("{}: label line {}: ^Core names {}, which must be a file beside the label",
-                                            info_.path, line, name));
-  }
-
-  void read_pixels(const LabelFields& pixels) {
-    const std::string name = pixels.word("TYPE").value_or("");
-    const auto& types = pixel_types();
-    const auto* const type =
-        std::find_if(types.begin(), types.end(), [&](const PixelType& t) { return name == t.name; });
-    if (type == types.end()) {
+  void read_pixels(const LabelBlock& pixels) {
+    const std::string name = pixels.word("TYPE");
+    const auto* const type = std::ranges::find(kPixelTypes, name, &PixelType::name);
+    if (type == kPixelTypes.end()) {
       pixels.refuse("TYPE", "UnsignedByte, SignedWord, UnsignedWord, UnsignedInteger or Real");
     }
     info_.sample_type = type->type;
     info_.void_values = {type->null};
     info_.valid_min = type->valid_min;
     info_.valid_max = type->valid_max;
-    size_ = static_cast<std::int64_t>(size_bytes(type->type));
-    const std::string order = pixels.word("BYTEORDER").value_or("LSB");
+    const std::string order = pixels.word("BYTEORDER", "LSB");
     if (order != "LSB" && order != "MSB") pixels.refuse("BYTEORDER", "Lsb or Msb");
-    big_endian_ = order == "MSB";
-    info_.z_scale = pixels.number("MULTIPLIER").value_or(1.0);
-    info_.z_offset = pixels.number("BASE").value_or(0.0);
-    if (info_.z_scale == 0.0) pixels.refuse("MULTIPLIER", "other than 0");
+    layout_.big_endian = order == "MSB";
+    set_scale(pixels.number("MULTIPLIER").value_or(1.0), pixels.number("BASE").value_or(0.0), "Multiplier");
   }
 
-  void read_mapping(const LabelBlock& cube) {
-    const auto groups = cube.all("MAPPING");
-    if (groups.empty()) return;
-    const LabelFields map(info_.path, *groups.front());
-    Georeference& geo = info_.georeference;
-    const std::string target = map.text("TARGETNAME").value_or("");
-    geo.system.semi_major_axis_m = metres_by_default(map, "EQUATORIALRADIUS");
-    const std::optional<double> polar = metres_by_default(map, "POLARRADIUS");
-    if (const std::optional<double> a = geo.system.semi_major_axis_m) {
-      geo.system.inverse_flattening = polar && *polar != *a ? *a / (*a - *polar) : 0.0;
+  /// The samples lie in tiles, which are whole at the edges too; bands in sequence are tiles of the whole raster.
+  void read_tiles(const LabelBlock& core, std::uint64_t label_bytes, const OpenOptions& options) {
+    const LabelBlock& dimensions = core.inner("DIMENSIONS");
+    info_.width = dimensions.count("SAMPLES", 1, kMostSamples);
+    info_.height = dimensions.count("LINES", 1, kMostSamples);
+    const std::int64_t bands = dimensions.count("BANDS", 1, kMostBands, 1);
+    const std::string format = core.word("FORMAT");
+    if (format != "TILE" && format != "BANDSEQUENTIAL") core.refuse("FORMAT", "Tile or BandSequential");
+    tile_.path = info_.path;
+    tile_.sample_type = info_.sample_type;
+    tile_.width = format == "TILE" ? core.count("TILESAMPLES", 1, kMostSamples) : info_.width;
+    tile_.height = format == "TILE" ? core.count("TILELINES", 1, kMostSamples) : info_.height;
+    tiles_across_ = (info_.width + tile_.width - 1) / tile_.width;
+    const std::int64_t tiles_down = (info_.height + tile_.height - 1) / tile_.height;
+    const auto begin = static_cast<std::uint64_t>(core.count("STARTBYTE", 1, std::int64_t{1} << 50)) - 1;
+    if (begin < label_bytes) core.refuse("STARTBYTE", fmt::format("behind the label, which has {} bytes", label_bytes));
+    const auto size = static_cast<double>(size_bytes(info_.sample_type));
+    const double band_bytes =
+        static_cast<double>(tiles_across_ * tile_.width) * static_cast<double>(tiles_down * tile_.height) * size;
+    const double end = static_cast<double>(begin) + band_bytes * static_cast<double>(bands);
+    if (static_cast<double>(file_->size_bytes()) < end) {
+      throw Error(ErrorCode::kCorrupt,
+                  fmt::format("{}: ends early: {} bytes, {} x {} samples in {} bands need {:.0f}", info_.path,
+                              file_->size_bytes(), info_.width, info_.height, bands, end));
     }
-    geo.system.body = body_of(target, std::nullopt);
-    if (geo.system.body.empty()) geo.system.body = target;
-    geo.system.name = fmt::format("{} {}", map.text("PROJECTIONNAME").value_or("unknown projection"), target);
-    PlanetaryMap planet{map.text("PROJECTIONNAME").value_or("unknown projection"),
-                        target,
-                        geo.system.semi_major_axis_m.value_or(0.0),
-                        polar.value_or(0.0),
-                        map.word("LATITUDETYPE").value_or("") == "PLANETOGRAPHIC",
-                        {}};
-    const bool to_west = map.word("LONGITUDEDIRECTION").value_or("") == "POSITIVEWEST";
-    planet.parameters.longitude = map.number("CENTERLONGITUDE").value_or(0.0) * (to_west ? -1.0 : 1.0);
-    planet.parameters.latitude = map.number("CENTERLATITUDE").value_or(0.0);
-    planet.parameters.scale = map.number("SCALEFACTOR").value_or(1.0);
-    planet.parameters.parallel_1 = map.number("FIRSTSTANDARDPARALLEL").value_or(0.0);
-    planet.parameters.parallel_2 = map.number("SECONDSTANDARDPARALLEL").value_or(0.0);
-    planet.pole.latitude = map.number("POLELATITUDE").value_or(90.0);
-    planet.pole.longitude = map.number("POLELONGITUDE").value_or(0.0) * (to_west ? -1.0 : 1.0);
-    planet.pole_rotation = map.number("POLEROTATION").value_or(0.0);
-    planet.distance_m = map.number("DISTANCE").value_or(0.0) * 1000.0;
-    geo.system.wkt = planetary_wkt(planet, info_.warnings);
-    if (map.number("ROTATION").value_or(0.0) != 0.0) {
-      info_.warnings.push_back(loss("the map is rotated; its place is left out"));
-      return;
-    }
-    const std::optional<double> resolution = metres_by_default(map, "PIXELRESOLUTION");
-    if (!resolution || !(*resolution > 0.0)) {
-      info_.warnings.push_back(loss("the group Mapping gives no PixelResolution in metres; the place is left out"));
-      return;
-    }
-    geo.unit = HorizontalUnit::kMetre;
-    geo.registration = Registration::kArea;
-    geo.spacing_x = geo.spacing_y = *resolution;
-    const std::optional<double> x = metres_by_default(map, "UPPERLEFTCORNERX");
-    const std::optional<double> y = metres_by_default(map, "UPPERLEFTCORNERY");
-    if (!x || !y) {
-      info_.warnings.push_back(
-          loss("the group Mapping gives no UpperLeftCornerX and Y in metres; the origin is unknown"));
-      return;
-    }
-    geo.has_origin = true;
-    geo.origin_x = *x + *resolution / 2.0;
-    geo.origin_y = *y - *resolution / 2.0;
+    layout_.offset_bytes =
+        begin + static_cast<std::uint64_t>(choose_band(info_, options, bands)) * static_cast<std::uint64_t>(band_bytes);
   }
 
-  /// Reads `part`, which lies in one tile, into its place in `window`.
-  void read_part(const Window& part, const Window& window, std::span<std::byte> samples) {
-    const std::int64_t tile = part.row / tile_rows_ * tiles_across_ + part.column / tile_columns_;
-    const std::uint64_t tile_bytes =
-        static_cast<std::uint64_t>(tile_columns_ * size_) * static_cast<std::uint64_t>(tile_rows_);
-    const std::uint64_t at = first_bytes_ + static_cast<std::uint64_t>(tile) * tile_bytes;
-    const std::int64_t row_bytes = tile_columns_ * size_;
-    const std::int64_t column = part.column % tile_columns_;
-    // Most of a row wanted: several rows at once cost less than a call for each.
-    const std::int64_t most =
-        part.columns * 2 >= tile_columns_ ? std::max<std::int64_t>(1, kPieceBytes / row_bytes) : 1;
-    for (std::int64_t r = 0; r < part.rows;) {
-      const std::int64_t rows = std::min(most, part.rows - r);
-      const std::int64_t row = part.row % tile_rows_ + r;
-      std::byte* out =
-          samples.data() + ((part.row + r - window.row) * window.columns + (part.column - window.column)) * size_;
-      const auto run = static_cast<std::size_t>(part.columns * size_);
-      const std::uint64_t begin = at + static_cast<std::uint64_t>(row * row_bytes + column * size_);
-      if (rows == 1) {
-        file_->read(begin, {out, run});
-      } else {
-        piece_.resize(static_cast<std::size_t>((rows - 1) * row_bytes) + run);
-        file_->read(begin, piece_);
-        for (std::int64_t i = 0; i < rows; ++i) {
-          std::memcpy(out + i * window.columns * size_, piece_.data() + i * row_bytes, run);
-        }
-      }
-      r += rows;
-    }
+  void read_mapping(const LabelBlock& mapping) {
+    const double east = mapping.word("LONGITUDEDIRECTION") == "POSITIVEWEST" ? -1.0 : 1.0;
+    const auto number = [&](const char* key, double otherwise = 0.0) {
+      return mapping.number(key).value_or(otherwise);
+    };
+    PlanetaryMap map;
+    map.projection = mapping.text("PROJECTIONNAME").value_or("unknown projection");
+    map.target = mapping.text("TARGETNAME").value_or("");
+    map.name = fmt::format("{} {}", map.projection, map.target);
+    map.equatorial_radius_m = mapping.metres("EQUATORIALRADIUS", "m");
+    map.polar_radius_m = mapping.metres("POLARRADIUS", "m");
+    map.planetographic = mapping.word("LATITUDETYPE") == "PLANETOGRAPHIC";
+    map.longitude = east * number("CENTERLONGITUDE");
+    map.latitude = number("CENTERLATITUDE");
+    map.scale = number("SCALEFACTOR", 1.0);
+    map.parallel_1 = number("FIRSTSTANDARDPARALLEL");
+    map.parallel_2 = number("SECONDSTANDARDPARALLEL");
+    map.pole = {east * number("POLELONGITUDE"), number("POLELATITUDE", 90.0)};
+    map.pole_rotation = number("POLEROTATION");
+    map.distance_m = number("DISTANCE") * 1000.0;
+    take_planetary_map(map, info_);
+    const double resolution = mapping.metres("PIXELRESOLUTION", "m").value_or(0.0);
+    if (number("ROTATION") != 0.0) return lose_place("the map is rotated");
+    if (!(resolution > 0.0)) return lose_place("the group Mapping gives no PixelResolution in metres");
+    const auto x = mapping.metres("UPPERLEFTCORNERX", "m");
+    const auto y = mapping.metres("UPPERLEFTCORNERY", "m");
+    place_by_corner(x.value_or(0.0), y.value_or(0.0), resolution, resolution);
+    info_.georeference.has_origin = x && y;
+    if (x && y) return;
+    info_.warnings.push_back(
+        loss("the group Mapping gives no UpperLeftCornerX and Y in metres; the origin is unknown"));
   }
 
-  std::uint64_t first_bytes_ = 0;  // of the band's first sample
-  std::uint64_t band_bytes_ = 0;
-  std::int64_t bands_ = 1;
-  std::int64_t size_ = 2;  // bytes of a sample
-  bool big_endian_ = false;
-  std::int64_t tile_columns_ = 0;
-  std::int64_t tile_rows_ = 0;
+  SourceInfo tile_;  ///< one tile as a raster
   std::int64_t tiles_across_ = 0;
   std::vector<std::byte> piece_;
 };
-
-}  // namespace
 
 bool looks_like_isis3(std::span<const std::byte> head) {
   std::string text;
@@ -273,11 +186,19 @@ bool looks_like_isis3(std::span<const std::byte> head) {
     const auto c = std::to_integer<unsigned char>(b);
     if (std::isspace(c) == 0) text += static_cast<char>(std::tolower(c));
   }
-  return text.rfind("object=isiscube", 0) == 0;
+  return text.starts_with("object=isiscube");
 }
 
 std::unique_ptr<HeightSource> open_isis3(const std::string& path, const OpenOptions& options) {
-  return std::make_unique<Isis3Source>(path, options);
+  return std::make_unique<Isis3Source>(path, read_label(path), options);
 }
+
+}  // namespace
+
+const Format kIsis3Format = {.name = "ISIS3 cube",
+                             .extensions = {".cub", ".lbl"},
+                             .note = "takes `channel`",
+                             .open = open_isis3,
+                             .recognises = looks_like_isis3};
 
 }  // namespace isohf

@@ -3,14 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
-#include <charconv>
 #include <cmath>
 #include <span>
 
 #include "formats/io/raw_file.h"
-#include "formats/io/text.h"
+#include "formats/io/text_tokens.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
+#include "isohf/projection/length_unit.h"
 
 namespace isohf {
 namespace {
@@ -24,46 +24,24 @@ bool is_space(char c) {
 
 class Parser {
  public:
-  Parser(const std::string& path, std::string_view text) : path_(path), text_(text) {}
+  Parser(const std::string& path, std::string_view text)
+      : path_(std::make_shared<const std::string>(path)), text_(text) {}
 
   LabelText parse() {
-    LabelText label;
-    // Blocks are built on a stack and moved into their parents, so that no pointer into a growing list is kept.
-    std::vector<LabelBlock> open(1);
-    while (true) {
-      skip_blank();
-      const int line = line_;
-      const std::string key = upper_case(bare());
-      if (key.empty()) fail(line, fmt::format("found {}, must be a keyword", what_is_here()));
-      if (key == "END") break;
-      if (key == "OBJECT" || key == "GROUP" || key == "BEGIN_OBJECT" || key == "BEGIN_GROUP") {
-        if (!skip_equals()) fail(line, key + " has no name");
-        if (open.size() > kDeepestBlock) fail(line, fmt::format("blocks lie deeper than {}", kDeepestBlock));
-        open.push_back({upper_case(scalar(key)), line, {}, {}});
-      } else if (key == "END_OBJECT" || key == "END_GROUP") {
-        close(open, line, key);
-      } else {
-        open.back().entries.push_back(statement(key, line));
-      }
-    }
-    if (open.size() > 1) fail(open.back().line, fmt::format("block {} has no end", open.back().name));
+    LabelText label{{path_, "", 1}};
+    statements(label.root, 0);
     while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\t' || text_[at_] == '\r')) ++at_;
     if (at_ < text_.size() && text_[at_] == '\n') ++at_;
     label.end_bytes = at_;
-    label.root = std::move(open.front());
     return label;
   }
 
  private:
   [[noreturn]] void fail(int line, const std::string& what) const {
-    throw Error(ErrorCode::kCorrupt, fmt::format("{}: label line {}: {}", path_, line, what));
+    throw Error(ErrorCode::kCorrupt, fmt::format("{}: label line {}: {}", *path_, line, what));
   }
 
-  [[nodiscard]] std::string what_is_here() const {
-    if (at_ >= text_.size()) return "the end of the label";
-    const auto c = static_cast<unsigned char>(text_[at_]);
-    return c > ' ' && c < 127 ? fmt::format("'{}'", text_[at_]) : fmt::format("byte {:#04x}", c);
-  }
+  [[nodiscard]] std::string what_is_here() const { return '\'' + printable(text_.substr(at_, 1)) + '\''; }
 
   [[nodiscard]] bool starts(std::string_view what) const { return text_.substr(at_, what.size()) == what; }
 
@@ -72,6 +50,7 @@ class Parser {
     ++at_;
   }
 
+  /// Goes to what is neither white space nor comment, which must be there.
   void skip_blank() {
     while (true) {
       while (at_ < text_.size() && is_space(text_[at_])) step();
@@ -110,21 +89,13 @@ class Parser {
     const char quote = text_[at_];
     const int line = line_;
     std::string result;
-    bool blank = false;
     for (step(); at_ < text_.size() && text_[at_] != quote; step()) {
-      if (is_space(text_[at_])) {
-        blank = true;
-      } else if (static_cast<unsigned char>(text_[at_]) < ' ') {
-        fail(line_, fmt::format("the text of {} of line {} holds {}", key, line, what_is_here()));
-      } else {
-        if (blank && !result.empty()) result += ' ';
-        blank = false;
-        result += text_[at_];
-      }
+      const bool is_blank = static_cast<unsigned char>(text_[at_]) <= ' ';
+      if (!is_blank || (!result.empty() && result.back() != ' ')) result += is_blank ? ' ' : text_[at_];
     }
     if (at_ >= text_.size()) fail(line, fmt::format("the text of {} has no closing {}", key, quote));
     step();
-    return result;
+    return trimmed(result);
   }
 
   std::string scalar(const std::string& key) {
@@ -143,14 +114,10 @@ class Parser {
     return result;
   }
 
-  LabelValue value(const std::string& key) {
-    LabelValue result{scalar(key), {}};
-    skip_blank();
-    if (text_[at_] == '<') result.unit = unit(key);
-    return result;
-  }
-
+  /// "<KM>", where one stands here.
   std::string unit(const std::string& key) {
+    skip_blank();
+    if (text_[at_] != '<') return {};
     const std::size_t begin = ++at_;
     while (at_ < text_.size() && text_[at_] != '>' && text_[at_] >= ' ') ++at_;
     if (at_ >= text_.size() || text_[at_] != '>') fail(line_, fmt::format("the unit of {} has no closing >", key));
@@ -173,9 +140,25 @@ class Parser {
       } else if (c == ',') {
         ++at_;
       } else {
-        values.push_back(value(key));
+        values.push_back({scalar(key), unit(key)});
       }
     } while (!closing.empty());
+    const std::string shared = unit(key);
+    for (LabelValue& each : values) {
+      if (each.unit.empty()) each.unit = shared;
+    }
+  }
+
+  /// Whether a value is left out, as some labels do: KEY =, and the next line is a statement of its own.
+  bool is_left_out(int line) {
+    if (line_ == line) return false;
+    const auto [at, before] = std::pair(at_, line_);
+    const std::string next = upper_case(bare());
+    const bool is_statement = next == "END" || next == "END_OBJECT" || next == "END_GROUP" ||  //
+                              (!next.empty() && skip_equals());
+    at_ = at;
+    line_ = before;
+    return is_statement;
   }
 
   LabelEntry statement(const std::string& key, int line) {
@@ -184,42 +167,40 @@ class Parser {
     skip_blank();
     if (text_[at_] == '(' || text_[at_] == '{') {
       list(key, entry.values);
-      skip_blank();
-      if (text_[at_] == '<') {
-        const std::string shared = unit(key);
-        for (LabelValue& each : entry.values) {
-          if (each.unit.empty()) each.unit = shared;
-        }
-      }
-      return entry;
+    } else if (!is_left_out(line)) {
+      entry.values.push_back({scalar(key), unit(key)});
     }
-    // Some labels leave a value out: KEY =, and the next line is a statement of its own.
-    const auto [at, before] = std::pair(at_, line_);
-    const std::string next = before > line ? upper_case(bare()) : "";
-    if (next == "END" || next == "END_OBJECT" || next == "END_GROUP" || (!next.empty() && skip_equals())) {
-      at_ = at;
-      line_ = before;
-      return entry;
-    }
-    at_ = at;
-    line_ = before;
-    entry.values.push_back(value(key));
     return entry;
   }
 
-  void close(std::vector<LabelBlock>& open, int line, const std::string& key) {
-    std::string name;
-    if (skip_equals()) name = upper_case(scalar(key));
-    if (open.size() < 2) fail(line, key + " without a beginning");
-    if (!name.empty() && name != open.back().name) {
-      fail(line, fmt::format("{} = {} ends block {} of line {}", key, name, open.back().name, open.back().line));
+  /// Reads what stands in `block`, and its end.
+  void statements(LabelBlock& block, std::size_t depth) {
+    while (true) {
+      skip_blank();
+      const int line = line_;
+      const std::string key = upper_case(bare());
+      if (key.empty()) fail(line, fmt::format("found {}, must be a keyword", what_is_here()));
+      if (key == "END") {
+        if (depth > 0) fail(block.line, fmt::format("block {} has no end", block.name));
+        return;
+      }
+      if (key == "END_OBJECT" || key == "END_GROUP") {
+        const std::string name = skip_equals() ? upper_case(scalar(key)) : block.name;
+        if (depth == 0) fail(line, key + " without a beginning");
+        if (name == block.name) return;
+        fail(line, fmt::format("{} = {} ends block {} of line {}", key, name, block.name, block.line));
+      }
+      if (key == "OBJECT" || key == "GROUP" || key == "BEGIN_OBJECT" || key == "BEGIN_GROUP") {
+        if (!skip_equals()) fail(line, key + " has no name");
+        if (depth == kDeepestBlock) fail(line, fmt::format("blocks lie deeper than {}", kDeepestBlock));
+        statements(block.blocks.emplace_back(LabelBlock{path_, upper_case(scalar(key)), line}), depth + 1);
+      } else {
+        block.entries.push_back(statement(key, line));
+      }
     }
-    LabelBlock done = std::move(open.back());
-    open.pop_back();
-    open.back().blocks.push_back(std::move(done));
   }
 
-  std::string path_;
+  std::shared_ptr<const std::string> path_;
   std::string_view text_;
   std::size_t at_ = 0;
   int line_ = 1;
@@ -232,18 +213,10 @@ void collect(const LabelBlock& block, std::string_view name, std::vector<const L
   }
 }
 
-template <typename Number, typename... Base>
-std::optional<Number> whole_text(std::string_view text, Base... base) {
-  Number number{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, base...);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return number;
-}
-
 }  // namespace
 
 const LabelEntry* LabelBlock::entry(std::string_view key) const {
-  const auto found = std::find_if(entries.begin(), entries.end(), [&](const LabelEntry& e) { return e.key == key; });
+  const auto found = std::ranges::find(entries, key, &LabelEntry::key);
   return found == entries.end() ? nullptr : &*found;
 }
 
@@ -253,84 +226,82 @@ std::vector<const LabelBlock*> LabelBlock::all(std::string_view block_name) cons
   return found;
 }
 
-LabelText parse_label(const std::string& path, std::string_view text) {
-  return Parser(path, text).parse();
+const LabelBlock& LabelBlock::inner(std::string_view block_name) const {
+  const auto found = std::ranges::find(blocks, block_name, &LabelBlock::name);
+  if (found != blocks.end()) return *found;
+  throw Error(ErrorCode::kCorrupt, fmt::format("{}: label line {}: there is no {} in {}", *path, line, block_name,
+                                               name.empty() ? "the label" : name));
 }
 
-LabelText read_label(const std::string& path, std::uint64_t unpacked_bytes) {
-  const RawFile file(path, unpacked_bytes);
-  std::string text(static_cast<std::size_t>(std::min<std::uint64_t>(file.size_bytes(), kMostLabelBytes)), '\0');
-  text.resize(file.read_some(0, std::as_writable_bytes(std::span(text))));
-  return parse_label(path, text);
+const LabelValue* LabelBlock::value(std::string_view key) const {
+  const LabelEntry* found = entry(key);
+  if (found == nullptr || found->values.empty()) return nullptr;
+  if (found->values.size() > 1) refuse(key, "one value");
+  return &found->values.front();
 }
 
-std::optional<double> number_of(const LabelValue& value) {
-  std::string_view text = value.text;
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
-  const std::size_t hash = text.find('#');
-  if (hash != std::string_view::npos && text.back() == '#' && text.size() > hash + 2) {
-    const std::optional<int> base = whole_text<int>(text.substr(0, hash));
-    if (!base || *base < 2 || *base > 16) return std::nullopt;
-    const auto digits = whole_text<std::uint32_t>(text.substr(hash + 1, text.size() - hash - 2), *base);
-    return digits ? std::optional(static_cast<double>(*digits)) : std::nullopt;
-  }
-  const std::optional<double> number = whole_text<double>(text);
-  return number && std::isfinite(*number) ? number : std::nullopt;
-}
-
-const LabelValue* LabelFields::value(std::string_view key) const {
-  const LabelEntry* entry = block_->entry(key);
-  if (entry == nullptr || entry->values.empty()) return nullptr;
-  if (entry->values.size() > 1) refuse(key, "one value");
-  return &entry->values.front();
-}
-
-std::optional<std::string> LabelFields::text(std::string_view key) const {
+std::optional<std::string> LabelBlock::text(std::string_view key) const {
   const LabelValue* found = value(key);
   return found == nullptr ? std::nullopt : std::optional(found->text);
 }
 
-std::optional<std::string> LabelFields::word(std::string_view key) const {
-  const std::optional<std::string> found = text(key);
-  return found ? std::optional(upper_case(*found)) : std::nullopt;
+std::string LabelBlock::word(std::string_view key, const char* otherwise) const {
+  return upper_case(text(key).value_or(otherwise));
 }
 
-std::optional<double> LabelFields::number(std::string_view key) const {
+std::optional<double> LabelBlock::number(std::string_view key) const {
   const LabelValue* found = value(key);
   return found == nullptr ? std::nullopt : number_of(*found);
 }
 
-std::string LabelFields::unit(std::string_view key) const {
+std::string LabelBlock::unit(std::string_view key) const {
   const LabelValue* found = value(key);
   return found == nullptr ? std::string() : found->unit;
 }
 
-std::int64_t LabelFields::count(std::string_view key, std::int64_t lowest, std::int64_t highest,
-                                std::optional<std::int64_t> fallback) const {
-  const LabelValue* found = value(key);
-  if (found == nullptr && fallback) return *fallback;
-  const std::string required = fmt::format("a whole number from {} to {}", lowest, highest);
-  if (found == nullptr) {
-    throw Error(ErrorCode::kCorrupt, fmt::format("{}: label line {}: block {} has no {}, must be {}", path_,
-                                                 block_->line, block_->name, key, required));
-  }
-  const std::optional<double> number = number_of(*found);
-  if (!number || std::trunc(*number) != *number || *number < static_cast<double>(lowest) ||
-      *number > static_cast<double>(highest)) {
-    refuse(key, required);
-  }
-  return static_cast<std::int64_t>(*number);
+std::optional<double> LabelBlock::metres(std::string_view key, const char* unit_by_default) const {
+  const std::string stated = unit(key);
+  const auto length = linear_unit(stated.empty() ? unit_by_default : stated.substr(0, stated.find('/')));
+  const std::optional<double> found = number(key);
+  return found && length ? std::optional(*found * length->metres) : std::nullopt;
 }
 
-void LabelFields::refuse(std::string_view key, const std::string& required) const {
-  const LabelEntry* entry = block_->entry(key);
+std::int64_t LabelBlock::count(std::string_view key, std::int64_t lowest, std::int64_t highest,
+                               std::optional<std::int64_t> otherwise) const {
+  const LabelValue* found = value(key);
+  if (found == nullptr && otherwise) return *otherwise;
+  const std::string required = fmt::format("a whole number from {} to {}", lowest, highest);
+  if (found == nullptr) {
+    throw Error(ErrorCode::kCorrupt,
+                fmt::format("{}: label line {}: block {} has no {}, must be {}", *path, line, name, key, required));
+  }
+  const double given = number_of(*found).value_or(NAN);
+  if (std::trunc(given) == given && given >= static_cast<double>(lowest) && given <= static_cast<double>(highest))
+    return static_cast<std::int64_t>(given);
+  refuse(key, required);
+}
+
+void LabelBlock::refuse(std::string_view key, const std::string& required) const {
+  const LabelEntry* found = entry(key);
   std::vector<std::string> texts;
-  if (entry != nullptr) {
-    for (const LabelValue& each : entry->values) texts.push_back(each.text);
+  if (found != nullptr) {
+    for (const LabelValue& each : found->values) texts.push_back(each.text);
   }
   throw Error(ErrorCode::kCorrupt,
-              fmt::format("{}: label line {}: {} is \"{}\", must be {}", path_,
-                          entry == nullptr ? block_->line : entry->line, key, fmt::join(texts, ", "), required));
+              fmt::format("{}: label line {}: {} is \"{}\", must be {}", *path, found == nullptr ? line : found->line,
+                          key, fmt::join(texts, ", "), required));
+}
+
+LabelText read_label(const std::string& path) {
+  const RawFile file(path);
+  std::string text(static_cast<std::size_t>(std::min<std::uint64_t>(file.size_bytes(), kMostLabelBytes)), '\0');
+  text.resize(file.read_some(0, std::as_writable_bytes(std::span(text))));
+  return Parser(path, text).parse();
+}
+
+std::optional<double> number_of(const LabelValue& value) {
+  double number = 0.0;
+  return read_decimal(value.text, number) && std::isfinite(number) ? std::optional(number) : std::nullopt;
 }
 
 }  // namespace isohf

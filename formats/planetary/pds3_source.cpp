@@ -1,7 +1,3 @@
-#include "formats/readers.h"
-#include "isohf/projection/body.h"
-#include "isohf/projection/length_unit.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,570 +6,414 @@
 #include <cctype>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <filesystem>
-#include <limits>
+#include <iterator>
 #include <numbers>
 #include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
 
-#include "formats/georeference/files_beside.h"
-#include "formats/georeference/map_wkt.h"
-#include "formats/grids/plain_samples.h"
+#include "formats/georeference/sidecars.h"
+#include "formats/grids/described_source.h"
 #include "formats/io/bands.h"
-#include "formats/io/text.h"
-#include "formats/open_options.h"
 #include "formats/planetary/label_text.h"
+#include "formats/planetary/planetary_system.h"
+#include "formats/readers.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
+#include "isohf/projection/body.h"
 #include "isohf/raster.h"
 
 namespace isohf {
 namespace {
 
-/// How the samples of a PDS3 IMAGE follow each other; offsets are from where ^IMAGE points.
-struct Pds3Layout {
-  std::int64_t columns = 0;
-  std::int64_t rows = 0;
-  std::int64_t bands = 1;
-  SampleType type = SampleType::kInt16;
-  BandOrder order = BandOrder::kBands;
-  PlainLayout samples;
-  std::uint64_t margin_bytes = 0;  ///< of a line: prefix and suffix
-  std::uint64_t total_bytes = 0;   ///< all bands with them, below 2^50
-};
-
-constexpr std::int64_t kMostMarginBytes = std::int64_t{1} << 31;
-
-struct SampleKind {
-  const char* name;
-  char kind;  ///< i: signed, u: unsigned, f: IEEE float, v: VAX F-float, g: another VAX float
-  bool big_endian;
-};
-
-// PDS Data Dictionary, SAMPLE_TYPE, with its synonyms.
-constexpr std::array<SampleKind, 22> kSampleKinds = {{{"MSB_INTEGER", 'i', true},
-                                                      {"INTEGER", 'i', true},
-                                                      {"SUN_INTEGER", 'i', true},
-                                                      {"MAC_INTEGER", 'i', true},
-                                                      {"LSB_INTEGER", 'i', false},
-                                                      {"PC_INTEGER", 'i', false},
-                                                      {"VAX_INTEGER", 'i', false},
-                                                      {"MSB_UNSIGNED_INTEGER", 'u', true},
-                                                      {"UNSIGNED_INTEGER", 'u', true},
-                                                      {"SUN_UNSIGNED_INTEGER", 'u', true},
-                                                      {"MAC_UNSIGNED_INTEGER", 'u', true},
-                                                      {"LSB_UNSIGNED_INTEGER", 'u', false},
-                                                      {"PC_UNSIGNED_INTEGER", 'u', false},
-                                                      {"VAX_UNSIGNED_INTEGER", 'u', false},
-                                                      {"IEEE_REAL", 'f', true},
-                                                      {"REAL", 'f', true},
-                                                      {"FLOAT", 'f', true},
-                                                      {"SUN_REAL", 'f', true},
-                                                      {"MAC_REAL", 'f', true},
-                                                      {"PC_REAL", 'f', false},
-                                                      {"VAX_REAL", 'v', false},
-                                                      {"VAXG_REAL", 'g', false}}};
-
-SampleType sample_type(char kind, std::int64_t bits, const LabelFields& image) {
-  if (kind == 'v') {
-    if (bits == 32) return SampleType::kFloat32;
-    image.refuse("SAMPLE_BITS", "32 for VAX floats");
-  }
-  if (kind == 'f') {
-    if (bits == 32) return SampleType::kFloat32;
-    if (bits == 64) return SampleType::kFloat64;
-    image.refuse("SAMPLE_BITS", "32 or 64 for floats");
-  }
-  if (bits == 8) return kind == 'u' ? SampleType::kUint8 : SampleType::kInt8;
-  if (bits == 16) return kind == 'u' ? SampleType::kUint16 : SampleType::kInt16;
-  if (bits == 32) return kind == 'u' ? SampleType::kUint32 : SampleType::kInt32;
-  image.refuse("SAMPLE_BITS", "8, 16 or 32 for integers");
-}
-
-void read_sample_type(const LabelFields& image, Pds3Layout& layout) {
-  std::string type = image.word("SAMPLE_TYPE").value_or("");
-  std::replace(type.begin(), type.end(), ' ', '_');
-  const auto* const kind =
-      std::find_if(kSampleKinds.begin(), kSampleKinds.end(), [&](const SampleKind& k) { return type == k.name; });
-  if (kind == kSampleKinds.end() || kind->kind == 'g') {
-    throw Error(ErrorCode::kUnsupported, fmt::format("{}: SAMPLE_TYPE is \"{}\"; MSB_, LSB_ and UNSIGNED integers, "
-                                                     "IEEE_REAL, PC_REAL and VAX_REAL are read",
-                                                     image.path(), type));
-  }
-  layout.type = sample_type(kind->kind, image.count("SAMPLE_BITS", 1, 64), image);
-  layout.samples.big_endian = kind->big_endian;
-  if (kind->kind == 'v') layout.samples.stored_as = StoredAs::kVaxFloat;
-}
-
-/// Reads an IMAGE object. Throws Error: kCorrupt for a field that says nothing, kUnsupported for what is not read.
-Pds3Layout pds3_layout(const LabelFields& image) {
-  const std::string coding = image.word("ENCODING_TYPE").value_or("N/A");
-  if (coding != "N/A" && coding != "NONE") {
-    throw Error(ErrorCode::kUnsupported,
-                fmt::format("{}: ENCODING_TYPE is {}; only plain samples are read", image.path(), coding));
-  }
-  if (image.word("LINE_DISPLAY_DIRECTION").value_or("DOWN") != "DOWN") image.refuse("LINE_DISPLAY_DIRECTION", "DOWN");
-  if (image.word("SAMPLE_DISPLAY_DIRECTION").value_or("RIGHT") != "RIGHT") {
-    image.refuse("SAMPLE_DISPLAY_DIRECTION", "RIGHT");
-  }
-  Pds3Layout layout;
-  read_sample_type(image, layout);
-  layout.columns = image.count("LINE_SAMPLES", 1, kMostSamples);
-  layout.rows = image.count("LINES", 1, kMostSamples);
-  layout.bands = image.count("BANDS", 1, kMostBands, 1);
-  const std::int64_t prefix = image.count("LINE_PREFIX_BYTES", 0, kMostMarginBytes, 0);
-  const std::int64_t suffix = image.count("LINE_SUFFIX_BYTES", 0, kMostMarginBytes, 0);
-  const auto size = static_cast<std::int64_t>(size_bytes(layout.type));
-  const std::string order = image.word("BAND_STORAGE_TYPE").value_or("BAND_SEQUENTIAL");
-  const bool by_sample = order == "SAMPLE_INTERLEAVED";
-  const bool by_line = order == "LINE_INTERLEAVED";
-  if (layout.bands > 1 && !by_sample && !by_line && order != "BAND_SEQUENTIAL") {
-    image.refuse("BAND_STORAGE_TYPE", "BAND_SEQUENTIAL, LINE_INTERLEAVED or SAMPLE_INTERLEAVED");
-  }
-  layout.order = by_sample ? BandOrder::kSamples : by_line ? BandOrder::kLines : BandOrder::kBands;
-  // At most 2^50: the factors are bounded.
-  const std::int64_t line = prefix + layout.columns * size * (by_sample ? layout.bands : 1) + suffix;
-  const std::int64_t lines_of_a_row = by_sample ? 1 : layout.bands;
-  const double total = static_cast<double>(line) * static_cast<double>(layout.rows * lines_of_a_row);
-  if (!(total < kMostBytes)) {
-    throw Error(ErrorCode::kCorrupt,
-                fmt::format("{}: {} x {} samples in {} bands need {:.3g} bytes, must be below 2^50", image.path(),
-                            layout.columns, layout.rows, layout.bands, total));
-  }
-  layout.samples.offset_bytes = static_cast<std::uint64_t>(prefix);
-  layout.margin_bytes = static_cast<std::uint64_t>(prefix + suffix);
-  layout.total_bytes = static_cast<std::uint64_t>(line * layout.rows * lines_of_a_row);
-  return layout;
-}
-
+constexpr std::int64_t kMostBytes = std::int64_t{1} << 31;  ///< of a record or of a line's prefix
 constexpr double kDegree = std::numbers::pi / 180.0;
 /// Bounds and offsets agree where they differ by less, in pixels; the meanings of the offsets differ by 1.
 constexpr double kSamePlace = 0.25;
 
+/// A product's label, and where the samples are that it describes.
+struct Product {
+  std::string path;
+  LabelText label;
+  const LabelBlock* image = nullptr;  ///< in the label
+  std::string data = {};
+  std::uint64_t begin_bytes = 0;  ///< where ^IMAGE points
+  int line = 0;                   ///< of ^IMAGE
+};
+
+/// Whether samples are in the byte order of PCs.
+bool is_little_endian(std::string_view type) {
+  return type.starts_with("LSB_") || type.starts_with("PC_") || type.starts_with("VAX_");
+}
+
+/// The label describes what comes out of the JPEG 2000 file that has the samples.
+[[noreturn]] void refuse_jpeg2000(const Product& product, const std::string& packed, const std::string& name) {
+  const LabelBlock& image = *product.image;
+  std::string remedy = fmt::format("gdal_translate {} OUT.tif converts the samples: it", packed);
+  if (is_little_endian(image.word("SAMPLE_TYPE"))) {
+    remedy = fmt::format("gdal_translate -of ENVI {} {} unpacks the samples for {}; any other copy", packed,
+                         std::filesystem::path(product.path).replace_filename(name).string(), product.path);
+  }
+  throw Error(ErrorCode::kUnsupported,
+              {product.path, "its samples are in JPEG 2000", "",
+               fmt::format("{} needs `z_scale` {} and `z_offset` {}", remedy,
+                           image.number("SCALING_FACTOR").value_or(1.0), image.number("OFFSET").value_or(0.0))});
+}
+
+/// The file of samples that ^IMAGE, which `holder` has, names.
+std::string data_file(const Product& product, const LabelBlock& holder, const std::string& name) {
+  const std::string data = name.find('/') == std::string::npos ? file_beside(product.path, name) : std::string();
+  if (!data.empty()) return data;
+  for (const LabelBlock* compressed : product.label.root.all("COMPRESSED_FILE")) {
+    const std::string packed = file_beside(product.path, compressed->text("FILE_NAME").value_or("/"));
+    if (!packed.empty()) refuse_jpeg2000(product, packed, name);
+  }
+  holder.refuse("^IMAGE", "a file beside the label");
+}
+
+/// Follows ^IMAGE: (record), <BYTES>, "file", ("file", record). The outer label's pointer goes before inner ones.
+Product read_product(const std::string& path) {
+  Product product{path, read_label(path)};
+  const LabelBlock& root = product.label.root;
+  const auto refuse = [&](const std::string& what) {
+    throw Error(ErrorCode::kUnsupported, path + ": the label " + what);
+  };
+  const auto images = root.all("IMAGE");
+  if (images.size() != 1) refuse(fmt::format("describes {} objects IMAGE, must be 1", images.size()));
+  product.image = images.front();
+  std::vector<const LabelBlock*> holders = {&root};
+  for (const char* name : {"UNCOMPRESSED_FILE", "FILE"}) std::ranges::copy(root.all(name), std::back_inserter(holders));
+  const auto found =
+      std::ranges::find_if(holders, [](const LabelBlock* block) { return block->entry("^IMAGE") != nullptr; });
+  if (found == holders.end()) refuse("has no ^IMAGE, which says where the samples are");
+  const LabelBlock& holder = **found;
+  const LabelEntry& pointer = *holder.entry("^IMAGE");
+  product.line = pointer.line;
+  const std::size_t values = pointer.values.size();
+  if (values != 1 && values != 2) holder.refuse("^IMAGE", "a place, a file, or a file and a place");
+  const bool names_file = values == 2 || !number_of(pointer.values.front());
+  product.data = names_file ? data_file(product, holder, pointer.values.front().text) : path;
+  if (names_file && values == 1) return product;
+  const LabelBlock& records = holder.entry("RECORD_BYTES") != nullptr ? holder : root;
+  const LabelValue& place = pointer.values.back();
+  const double unit =
+      place.unit.starts_with("byte") ? 1.0 : static_cast<double>(records.count("RECORD_BYTES", 1, kMostBytes));
+  const double number = number_of(place).value_or(0.0);
+  if (!(number >= 1.0 && number * unit < 0x1p53) || number != std::floor(number))
+    holder.refuse("^IMAGE", "at a whole number from 1");
+  product.begin_bytes = static_cast<std::uint64_t>((number - 1.0) * unit);
+  return product;
+}
+
 std::string spaced(std::string text) {
-  std::replace(text.begin(), text.end(), '_', ' ');
+  std::ranges::replace(text, '_', ' ');
   return text;
 }
 
-std::string capitalised(std::string text) {
-  for (std::size_t i = 1; i < text.size(); ++i) {
-    text[i] = static_cast<char>(std::tolower(static_cast<unsigned char>(text[i])));
-  }
-  return text;
+std::string capitalised(const std::string& text) {
+  return text.empty() ? text : text.substr(0, 1) + lower_case(text.substr(1));
 }
 
-/// A length in metres; kilometres where no unit stands there, as the data dictionary has it. "km/pixel" counts as km.
-std::optional<double> metres(const LabelFields& fields, const char* key) {
-  const std::optional<double> number = fields.number(key);
-  if (!number || !(*number > 0.0)) return std::nullopt;
-  const std::string unit = fields.unit(key);
-  if (unit.empty()) return *number * 1000.0;
-  const std::optional<LinearUnit> length = linear_unit(unit.substr(0, unit.find('/')));
-  return length ? std::optional(*number * length->metres) : std::nullopt;
-}
-
-/// What a label says of a raster's place.
-struct Pds3Place {
-  Georeference georeference;
-  std::vector<Warning> warnings;
+/// Where the edges of a map lie by its label, in units of the map; nullopt where the label does not say.
+struct Edges {
+  std::optional<double> west;
+  std::optional<double> east;
+  std::optional<double> north;
+  std::optional<double> south;
+  double turn = 360.0;  ///< once round
 };
 
-class Placer {
- public:
-  Placer(const LabelFields& map, std::int64_t columns, std::int64_t rows, Pds3Place& place)
-      : map_(map), columns_(columns), rows_(rows), place_(place), geo_(place.georeference) {}
+/// What projection offsets count from.
+struct Middle {
+  double x = 0.0;
+  std::array<double, 2> y = {};  ///< latitudes that the lines may count from
+};
 
-  void read(const std::string& target) {
-    projection_ = spaced(map_.word("MAP_PROJECTION_TYPE").value_or(""));
-    read_ellipsoid();
-    const double rotation = map_.number("MAP_PROJECTION_ROTATION").value_or(0.0);
-    if (rotation != 0.0) {
-      warn(loss(fmt::format("the map is rotated by {} degrees; its place is left out", rotation)));
-      return;
-    }
-    if (!read_scale()) {
-      warn(loss("the label gives no MAP_RESOLUTION in pixels per degree and no MAP_SCALE; the place is left out"));
-      return;
-    }
-    if (degrees_) {
-      geo_.unit = HorizontalUnit::kDegree;
-      geo_.system.name = fmt::format("{} {}", target, map_.word("COORDINATE_SYSTEM_NAME").value_or("PLANETOCENTRIC"));
-    } else {
-      geo_.unit = HorizontalUnit::kMetre;
-      geo_.system.name = fmt::format("{} {}", projection_.empty() ? "UNKNOWN PROJECTION" : projection_, target);
-    }
-    name_map(target);
-    geo_.spacing_x = geo_.spacing_y = spacing_;
-    geo_.registration = Registration::kArea;
-    read_bounds();
-    const std::optional<double> line = map_.number("LINE_PROJECTION_OFFSET");
-    const std::optional<double> sample = map_.number("SAMPLE_PROJECTION_OFFSET");
-    if (line && sample) {
-      place_by_offsets(*sample, *line);
-    } else {
-      place_by_bounds();
-    }
-    if (degrees_ && geo_.has_origin) choose_turn();
+class Pds3Source final : public DescribedSource {
+ public:
+  Pds3Source(const Product& product, const OpenOptions& options) : DescribedSource(product.data, "PDS3", product.path) {
+    const LabelBlock& image = *product.image;
+    read_type(image);
+    read_layout(product, options);
+    describe(image);
+    read_place(product.label.root);
+    finish(options, 0);
   }
 
  private:
-  void warn(Warning text) { place_.warnings.push_back(std::move(text)); }
-
-  void read_ellipsoid() {
-    const std::optional<double> a = metres(map_, "A_AXIS_RADIUS");
-    const std::optional<double> c = metres(map_, "C_AXIS_RADIUS");
-    if (!a) return;
-    geo_.system.semi_major_axis_m = a;
-    geo_.system.inverse_flattening = c && *c != *a ? *a / (*a - *c) : 0.0;
+  void read_type(const LabelBlock& image) {
+    std::string type = image.word("SAMPLE_TYPE");
+    std::ranges::replace(type, ' ', '_');
+    // PDS Data Dictionary: in its synonyms what the bytes are follows their order.
+    std::string kind = type;
+    for (const std::string_view order : {"LSB_", "PC_", "VAX_", "MSB_", "SUN_", "MAC_", "IEEE_"}) {
+      if (type.starts_with(order)) kind.erase(0, order.size());
+    }
+    const bool is_float = kind == "REAL" || kind == "FLOAT";
+    const bool is_unsigned = kind == "UNSIGNED_INTEGER";
+    if (!is_float && !is_unsigned && kind != "INTEGER") {
+      refuse(ErrorCode::kUnsupported, fmt::format("SAMPLE_TYPE is \"{}\"; MSB_, LSB_ and UNSIGNED integers, IEEE_REAL, "
+                                                  "PC_REAL and VAX_REAL are read",
+                                                  printable(type)));
+    }
+    layout_.big_endian = !is_little_endian(type);
+    const bool is_vax = is_float && type.starts_with("VAX_");
+    if (is_vax) layout_.stored_as = StoredAs::kVaxFloat;
+    const std::int64_t bits = image.count("SAMPLE_BITS", 1, 64);
+    if (is_float ? bits != 32 && (bits != 64 || is_vax) : bits != 8 && bits != 16 && bits != 32)
+      image.refuse("SAMPLE_BITS", is_vax ? "32 for VAX floats" : is_float ? "32 or 64 for floats" : "8, 16 or 32");
+    const std::string name = is_float ? "float" : is_unsigned ? "uint" : "int";
+    info_.sample_type = sample_type_from_string(name + std::to_string(bits));
   }
 
-  /// The WKT of the map, in degrees or metres as it is placed.
-  void name_map(const std::string& target) {
-    PlanetaryMap planet{degrees_ ? "" : projection_,
-                        capitalised(target),
-                        geo_.system.semi_major_axis_m.value_or(0.0),
-                        metres(map_, "C_AXIS_RADIUS").value_or(0.0),
-                        map_.word("COORDINATE_SYSTEM_NAME").value_or("") == "PLANETOGRAPHIC",
-                        {}};
-    const bool to_west = map_.word("POSITIVE_LONGITUDE_DIRECTION").value_or("EAST") == "WEST";
-    planet.parameters.longitude = map_.number("CENTER_LONGITUDE").value_or(0.0) * (to_west ? -1.0 : 1.0);
-    planet.parameters.latitude = map_.number("CENTER_LATITUDE").value_or(0.0);
-    if (cylindrical_) planet.parameters.latitude = true_latitude_;
-    planet.parameters.parallel_1 = map_.number("FIRST_STANDARD_PARALLEL").value_or(0.0);
-    planet.parameters.parallel_2 = map_.number("SECOND_STANDARD_PARALLEL").value_or(0.0);
-    planet.pole.latitude = map_.number("OBLIQUE_PROJ_POLE_LATITUDE").value_or(90.0);
-    planet.pole.longitude = map_.number("OBLIQUE_PROJ_POLE_LONGITUDE").value_or(0.0) * (to_west ? -1.0 : 1.0);
-    planet.pole_rotation = map_.number("OBLIQUE_PROJ_POLE_ROTATION").value_or(0.0);
-    geo_.system.wkt = planetary_wkt(planet, place_.warnings);
+  void read_layout(const Product& product, const OpenOptions& options) {
+    const LabelBlock& image = *product.image;
+    if (const std::string coding = image.word("ENCODING_TYPE", "N/A"); coding != "N/A" && coding != "NONE")
+      refuse(ErrorCode::kUnsupported,
+             fmt::format("ENCODING_TYPE is {}; only plain samples are read", printable(coding)));
+    for (const auto& [key, way] :
+         {std::pair("LINE_DISPLAY_DIRECTION", "DOWN"), {"SAMPLE_DISPLAY_DIRECTION", "RIGHT"}}) {
+      if (image.word(key, way) != way) image.refuse(key, way);
+    }
+    info_.width = image.count("LINE_SAMPLES", 1, kMostSamples);
+    info_.height = image.count("LINES", 1, kMostSamples);
+    const std::int64_t bands = image.count("BANDS", 1, kMostBands, 1);
+    const std::int64_t prefix = image.count("LINE_PREFIX_BYTES", 0, kMostBytes, 0);
+    const std::int64_t margin = prefix + image.count("LINE_SUFFIX_BYTES", 0, kMostBytes, 0);
+    const std::string order = image.word("BAND_STORAGE_TYPE", "BAND_SEQUENTIAL");
+    const bool by_sample = order == "SAMPLE_INTERLEAVED";
+    const bool by_line = order == "LINE_INTERLEAVED";
+    if (bands > 1 && !by_sample && !by_line && order != "BAND_SEQUENTIAL")
+      image.refuse("BAND_STORAGE_TYPE", "BAND_SEQUENTIAL, LINE_INTERLEAVED or SAMPLE_INTERLEAVED");
+    const auto samples = static_cast<double>(info_.width * (by_sample ? bands : 1));
+    const double line = samples * static_cast<double>(size_bytes(info_.sample_type)) + static_cast<double>(margin);
+    const auto lines = static_cast<double>(info_.height * (by_sample ? 1 : bands));
+    layout_.offset_bytes = begin_of_samples(product, line * lines) + static_cast<std::uint64_t>(prefix);
+    layout_.take_band(info_,
+                      by_sample ? BandOrder::kSamples
+                      : by_line ? BandOrder::kLines
+                                : BandOrder::kBands,
+                      choose_band(info_, options, bands), bands, header_, static_cast<std::uint64_t>(margin));
   }
 
-  /// Which unit the map has, and how many of them lie between samples; false where the label does not say.
-  bool read_scale() {
-    const bool simple = projection_ == "SIMPLE CYLINDRICAL";
-    cylindrical_ = simple || projection_ == "EQUIRECTANGULAR" || projection_ == "EQUIDISTANT CYLINDRICAL";
-    const double centre = map_.number("CENTER_LATITUDE").value_or(0.0);
-    if (!simple) true_latitude_ = map_.number("FIRST_STANDARD_PARALLEL").value_or(centre);
-    if (simple) bases_[1] = centre;
-    degrees_ = cylindrical_ && true_latitude_ == 0.0;
-
-    const std::string unit = map_.unit("MAP_RESOLUTION");
-    const bool per_degree = unit.empty() || unit.find("/deg") != std::string::npos;
-    // 0 stands for what the label does not say.
-    const double resolution = per_degree ? std::max(0.0, map_.number("MAP_RESOLUTION").value_or(0.0)) : 0.0;
-    const double scale = metres(map_, "MAP_SCALE").value_or(0.0);
-    const double radius = geo_.system.semi_major_axis_m.value_or(0.0);
-    // The radius that the label itself uses: HiRISE's is that of the ellipsoid at the true latitude.
-    radius_ = resolution > 0.0 && scale > 0.0 ? scale * resolution / kDegree : radius;
-    if (degrees_) {
-      spacing_ = resolution > 0.0 ? 1.0 / resolution : scale / (radius * kDegree);
-    } else {
-      spacing_ = scale > 0.0 ? scale : radius * kDegree / resolution;
-    }
-    return spacing_ > 0.0 && std::isfinite(spacing_);
+  /// Editing a label's text moves the samples. Where they fill the rest of the file there is no doubt.
+  std::uint64_t begin_of_samples(const Product& product, double total_bytes) {
+    const std::uint64_t end = product.label.end_bytes;
+    if (product.data != product.path || product.begin_bytes >= end) return product.begin_bytes;
+    const double more = static_cast<double>(file_->size_bytes()) - static_cast<double>(end) - total_bytes;
+    const std::string where =
+        fmt::format("^IMAGE points at byte {}, inside the label, which ends at byte {}", product.begin_bytes + 1, end);
+    if (!(more >= 0.0 && more <= 3.0))
+      refuse(ErrorCode::kCorrupt, fmt::format("label line {}: {}", product.line, where));
+    info_.warnings.emplace_back(where + "; the samples fill the rest of the file and are read from there");
+    return end;
   }
 
-  /// The West and North edges in units of the map, and the middle of the projection.
-  void read_bounds() {
-    const bool west_positive = map_.word("POSITIVE_LONGITUDE_DIRECTION").value_or("EAST") == "WEST";
-    const double east = west_positive ? -1.0 : 1.0;
-    const double centre = east * map_.number("CENTER_LONGITUDE").value_or(0.0);
-    if (degrees_) centre_x_ = centre;
-    if (!cylindrical_) return;
-    const double to_x = degrees_ ? 1.0 : radius_ * kDegree * std::cos(true_latitude_ * kDegree);
-    const double to_y = degrees_ ? 1.0 : radius_ * kDegree;
-    turn_ = 360.0 * to_x;
-    if (const auto value = map_.number("WESTERNMOST_LONGITUDE")) west_ = (east * *value - centre) * to_x + centre_x_;
-    if (const auto value = map_.number("MAXIMUM_LATITUDE")) north_ = *value * to_y;
-    if (const auto value = map_.number("MINIMUM_LATITUDE")) south_ = *value * to_y;
-    if (const auto value = map_.number("EASTERNMOST_LONGITUDE")) east_ = (east * *value - centre) * to_x + centre_x_;
-  }
-
-  /// How far, in pixels, the bounds are from a raster whose first sample has these coordinates.
-  [[nodiscard]] double distance_to_bounds(double x, double y) const {
-    double distance = 0.0;
-    if (west_) distance = std::abs(std::remainder(x - spacing_ / 2.0 - *west_, turn_)) / spacing_;
-    if (north_) distance = std::max(distance, std::abs(y + spacing_ / 2.0 - *north_) / spacing_);
-    return distance;
-  }
-
-  void place_by_offsets(double sample, double line) {
-    const std::array<std::array<double, 2>, 3> first = {
-        {{-sample, line}, {1.0 - sample, line - 1.0}, {sample, -line}}};  // columns East, rows North of the middle
-    std::size_t best = 0;
-    double best_base = bases_[0];
-    double least = INFINITY;
-    for (std::size_t i = 0; i < first.size(); ++i) {
-      for (const double base : bases_) {
-        const double distance = distance_to_bounds(centre_x_ + first[i][0] * spacing_, base + first[i][1] * spacing_);
-        if (distance < least) std::tie(best, best_base, least) = std::tuple(i, base, distance);
-      }
-    }
-    if (!west_ || !north_) {
-      // A map round its own middle tells by its size alone.
-      const auto middle = [&](double one) {
-        return 2.0 * sample == static_cast<double>(columns_) + one && 2.0 * line == static_cast<double>(rows_) + one;
-      };
-      best = middle(1.0) ? 1 : 0;
-      best_base = bases_[0];
-      if (!middle(1.0) && !middle(-1.0)) {
-        warn(
-            "nothing in the label confirms LINE_ and SAMPLE_PROJECTION_OFFSET; they are taken from the middle of the "
-            "first sample");
-      }
-    } else if (!(least <= kSamePlace)) {
-      best = 0;
-      best_base = bases_[0];
-      warn(
-          fmt::format("LINE_ and SAMPLE_PROJECTION_OFFSET lie {:.2f} samples or more off MAXIMUM_LATITUDE and "
-                      "WESTERNMOST_LONGITUDE; the offsets are followed",
-                      least));
-    }
-    geo_.has_origin = true;
-    geo_.origin_x = centre_x_ + first[best][0] * spacing_;
-    geo_.origin_y = best_base + first[best][1] * spacing_;
-  }
-
-  void place_by_bounds() {
-    if (!west_ || !north_ || !south_ || !east_) {
-      warn(loss("the label gives neither projection offsets nor bounds; the origin is unknown"));
-      return;
-    }
-    const auto spans = [&](std::int64_t columns, std::int64_t rows) {
-      const double width = static_cast<double>(columns) * spacing_;
-      return std::abs(std::remainder(*east_ - *west_ - width, turn_)) <= kSamePlace * spacing_ &&
-             std::abs(*north_ - *south_ - static_cast<double>(rows) * spacing_) <= kSamePlace * spacing_;
-    };
-    double inward = 0.0;
-    if (spans(columns_, rows_)) {
-      inward = spacing_ / 2.0;
-    } else if (spans(columns_ - 1, rows_ - 1)) {
-      geo_.registration = Registration::kPoint;
-    } else {
-      warn(loss(fmt::format(
-          "the label's bounds do not span {} x {} samples and it gives no projection offsets; the origin is "
-          "unknown",
-          columns_, rows_)));
-      return;
-    }
-    geo_.has_origin = true;
-    geo_.origin_x = *west_ + inward;
-    geo_.origin_y = *north_ - inward;
-  }
-
-  /// The turn of longitude that the label's bounds name; within [-180, 360) where they name none.
-  void choose_turn() {
-    if (west_ && *west_ >= -180.0 && *west_ < 360.0) {
-      geo_.origin_x += 360.0 * std::round((*west_ - geo_.origin_x) / 360.0);
-    } else if (geo_.origin_x < -180.0 || geo_.origin_x >= 360.0) {
-      geo_.origin_x -= 360.0 * std::floor((geo_.origin_x + 180.0) / 360.0);
-    }
-  }
-
-  const LabelFields& map_;
-  std::int64_t columns_;
-  std::int64_t rows_;
-  Pds3Place& place_;
-  Georeference& geo_;
-  std::string projection_;
-  bool cylindrical_ = false;
-  bool degrees_ = false;
-  double true_latitude_ = 0.0;
-  double spacing_ = 0.0;
-  double radius_ = 0.0;
-  double centre_x_ = 0.0;             // where the offsets count from
-  std::array<double, 2> bases_ = {};  // latitudes that the lines may count from
-  double turn_ = 360.0;               // once round
-  std::optional<double> west_;        // edges
-  std::optional<double> east_;
-  std::optional<double> north_;
-  std::optional<double> south_;
-};
-
-/// Interprets TARGET_NAME and IMAGE_MAP_PROJECTION of a label (PDS Standards Reference 3.8, appendix B).
-///
-/// Simple cylindrical maps, and equirectangular ones true at the equator, are placed in degrees, East positive; all
-/// others in metres of their own projection, whose name is carried. The projection offsets count from the middle of
-/// sample (1, 1); MOLA's labels count that sample as 1 instead, and old ones turn the sign. MAXIMUM_LATITUDE and
-/// WESTERNMOST_LONGITUDE, which name edges of pixels, tell which is meant; what they do not confirm is said in a
-/// warning.
-Pds3Place place_from_pds3(const std::string& path, const LabelBlock& root, std::int64_t columns, std::int64_t rows) {
-  Pds3Place place;
-  const LabelEntry* target = root.entry("TARGET_NAME");
-  const std::string name = target == nullptr || target->values.empty() ? "" : target->values.front().text;
-  const auto maps = root.all("IMAGE_MAP_PROJECTION");
-  if (!maps.empty()) Placer(LabelFields(path, *maps.front()), columns, rows, place).read(name);
-  ReferenceSystem& system = place.georeference.system;
-  system.body = body_of(name, system.semi_major_axis_m);
-  if (body_of(name, std::nullopt).empty() && !name.empty()) system.body = capitalised(name);
-  return place;
-}
-
-class Pds3Source final : public PlainSource {
- public:
-  Pds3Source(const std::string& path, const OpenOptions& options) : PlainSource(path, "PDS3"), label_path_(path) {
-    if (has_pds3_label(path)) label_path_ = file_beside(path, std::filesystem::path(path).stem().string() + ".lbl");
-    const LabelText label = read_label(label_path_, options.unpacked_bytes);
-    const LabelBlock& image = only_image(label.root);
-    const LabelFields fields(label_path_, image);
-    image_ = pds3_layout(fields);
-    find_data(label);
-    if (label_path_ != path && !same_file(path, data_path_)) {
-      throw Error(ErrorCode::kUnsupported,
-                  fmt::format("{}: its label {} describes {} instead", path, label_path_, data_path_));
-    }
-    file_.emplace(data_path_, options.unpacked_bytes);
-    check_size(label);
-    describe(fields, label.root);
-    layout_.take_band(info_, image_.order, choose_band(info_, options, image_.bands), image_.bands, label_path_,
-                      image_.margin_bytes);
-    apply_open_options(info_, options);
-  }
-
- private:
-  [[nodiscard]] const LabelBlock& only_image(const LabelBlock& root) const {
-    const auto images = root.all("IMAGE");
-    if (images.size() == 1) return *images.front();
-    throw Error(ErrorCode::kUnsupported,
-                fmt::format("{}: the label describes {} objects IMAGE, must be 1", label_path_, images.size()));
-  }
-
-  /// Follows ^IMAGE: (record), <BYTES>, "file", ("file", record). The outer label's pointer goes before inner ones.
-  void find_data(const LabelText& label) {
-    const LabelBlock* holder = label.root.entry("^IMAGE") != nullptr ? &label.root : nullptr;
-    for (const char* name : {"UNCOMPRESSED_FILE", "FILE"}) {
-      for (const LabelBlock* block : label.root.all(name)) {
-        if (holder == nullptr && block->entry("^IMAGE") != nullptr) holder = block;
-      }
-    }
-    if (holder == nullptr) {
-      throw Error(ErrorCode::kUnsupported, label_path_ + ": the label has no ^IMAGE, which says where the samples are");
-    }
-    const LabelEntry& pointer = *holder->entry("^IMAGE");
-    const auto refuse = [&](const std::string& what) {
-      throw Error(ErrorCode::kCorrupt, fmt::format("{}: label line {}: ^IMAGE {}", label_path_, pointer.line, what));
-    };
-    if (pointer.values.empty() || pointer.values.size() > 2) refuse("must be a place, a file, or a file and a place");
-    const bool names_file = pointer.values.size() == 2 || !number_of(pointer.values.front());
-    data_path_ = label_path_;
-    if (names_file) {
-      const std::string& name = pointer.values.front().text;
-      if (name.find('/') != std::string::npos) refuse(fmt::format("names {}, must be a file beside the label", name));
-      data_path_ = file_beside(label_path_, name);
-      if (data_path_.empty()) {
-        throw Error(ErrorCode::kIo, fmt::format("{}: label line {}: ^IMAGE names {}, which is not beside the label",
-                                                label_path_, pointer.line, name));
-      }
-    }
-    if (names_file && pointer.values.size() == 1) return;
-    const LabelValue& place = pointer.values.back();
-    const std::optional<double> number = number_of(place);
-    if (!number || !(*number >= 1.0) || *number > 9e15 || *number != static_cast<double>(std::int64_t(*number))) {
-      refuse(fmt::format("is \"{}\", must be a whole number from 1", place.text));
-    }
-    const auto ordinal = static_cast<std::uint64_t>(*number) - 1;
-    if (place.unit.rfind("byte", 0) == 0) {
-      image_bytes_ = ordinal;
-    } else {
-      const LabelBlock& records = holder->entry("RECORD_BYTES") != nullptr ? *holder : label.root;
-      const auto record =
-          static_cast<std::uint64_t>(LabelFields(label_path_, records).count("RECORD_BYTES", 1, std::int64_t{1} << 31));
-      if (ordinal > (std::uint64_t{1} << 62U) / record) refuse("points beyond any file");
-      image_bytes_ = ordinal * record;
-    }
-    pointer_line_ = pointer.line;
-  }
-
-  [[nodiscard]] static bool same_file(const std::string& a, const std::string& b) {
-    std::error_code ignored;
-    return std::filesystem::equivalent(a, b, ignored);
-  }
-
-  /// Every sample must be in the file, and none inside the label.
-  void check_size(const LabelText& label) {
-    const std::uint64_t total = image_.total_bytes;
-    const std::uint64_t there = file_->size_bytes();
-    if (data_path_ == label_path_ && image_bytes_ < label.end_bytes) {
-      // Editing a label's text moves the samples. Where they fill the rest of the file there is no doubt.
-      if (there < label.end_bytes + total || there > label.end_bytes + total + 3) {
-        throw Error(ErrorCode::kCorrupt, fmt::format("{}: label line {}: ^IMAGE points at byte {}, inside the label, "
-                                                     "which ends at byte {}",
-                                                     label_path_, pointer_line_, image_bytes_ + 1, label.end_bytes));
-      }
-      info_.warnings.push_back(
-          fmt::format("^IMAGE points at byte {}, inside the label, which ends at byte {}; the samples fill the rest of "
-                      "the file and "
-                      "are read from there",
-                      image_bytes_ + 1, label.end_bytes));
-      image_bytes_ = label.end_bytes;
-    }
-    if (image_bytes_ + total > there) {
-      throw Error(ErrorCode::kCorrupt,
-                  fmt::format("{}: has {} bytes; {} x {} samples of {} from byte {} need {}", data_path_, there,
-                              image_.columns, image_.rows, to_string(image_.type), image_bytes_, image_bytes_ + total));
-    }
-    layout_ = image_.samples;
-    layout_.offset_bytes += image_bytes_;
-  }
-
-  void describe(const LabelFields& image, const LabelBlock& root) {
-    info_.width = image_.columns;
-    info_.height = image_.rows;
-    info_.sample_type = image_.type;
-    info_.block_width = info_.width;
-    info_.block_height = 1;
-    info_.z_scale = image.number("SCALING_FACTOR").value_or(1.0);
-    info_.z_offset = image.number("OFFSET").value_or(0.0);
-    if (info_.z_scale == 0.0) image.refuse("SCALING_FACTOR", "other than 0");
-    const std::string unit = image.word("UNIT").value_or("N/A");
-    if (unit != "N/A" && unit != "UNK" && unit != "NULL") {
-      const std::optional<LinearUnit> length = linear_unit(unit);
-      info_.vertical_unit = length ? length->name : lower_case(unit);
-      info_.metres_per_vertical_unit = length ? length->metres : 1.0;
-    }
+  void describe(const LabelBlock& image) {
+    set_scale(image.number("SCALING_FACTOR").value_or(1.0), image.number("OFFSET").value_or(0.0), "SCALING_FACTOR");
+    const std::string unit = image.word("UNIT", "N/A");
+    if (unit != "N/A" && unit != "UNK" && unit != "NULL") set_unit(unit);
     for (const char* key : {"MISSING_CONSTANT", "MISSING", "NULL", "NULL_CONSTANT", "CORE_NULL", "INVALID_CONSTANT",
                             "LOW_REPR_SATURATION", "LOW_INSTR_SATURATION", "HIGH_REPR_SATURATION",
                             "HIGH_INSTR_SATURATION", "CORE_LOW_REPR_SATURATION", "CORE_LOW_INSTR_SATURATION",
                             "CORE_HIGH_REPR_SATURATION", "CORE_HIGH_INSTR_SATURATION"}) {
-      if (const LabelEntry* entry = image.block().entry(key)) {
-        for (const LabelValue& value : entry->values) add_void(key, value);
+      const LabelEntry* const entry = image.entry(key);
+      if (entry == nullptr) continue;
+      for (const LabelValue& value : entry->values) {
+        if (const auto number = constant(value.text)) set_void(*number);
       }
     }
     // ISIS writes its special pixels into PDS products: the lowest values of 32 bit floats, up to FF7FFFF9.
-    if (info_.sample_type == SampleType::kFloat32 && layout_.stored_as != StoredAs::kVaxFloat)
+    if (info_.sample_type == SampleType::kFloat32 && layout_.stored_as == StoredAs::kItself)
       info_.valid_min = std::bit_cast<float>(0xFF7FFFFAU);
-    Pds3Place place = place_from_pds3(label_path_, root, info_.width, info_.height);
-    info_.georeference = std::move(place.georeference);
-    info_.warnings.insert(info_.warnings.end(), place.warnings.begin(), place.warnings.end());
   }
 
-  /// A based constant of a float gives the bits, not the number.
-  void add_void(const char* key, const LabelValue& value) {
-    std::optional<double> number = number_of(value);
-    if (!number) return;  // N/A
-    if (info_.sample_type == SampleType::kFloat32 && value.text.find('#') != std::string::npos) {
-      const auto bits = static_cast<std::uint32_t>(*number);
-      number = static_cast<double>(layout_.stored_as == StoredAs::kVaxFloat ? float_from_vax(bits)
-                                                                            : std::bit_cast<float>(bits));
+  /// IMAGE_MAP_PROJECTION (PDS Standards Reference 3.8, appendix B). Simple cylindrical maps, and equirectangular ones true
+  /// at the equator, are placed in degrees, East positive; all others in metres of their own projection.
+  void read_place(const LabelBlock& root) {
+    const LabelEntry* const entry = root.entry("TARGET_NAME");
+    const std::string target = entry == nullptr || entry->values.empty() ? "" : entry->values.front().text;
+    const auto maps = root.all("IMAGE_MAP_PROJECTION");
+    if (maps.empty()) {
+      std::string& body = info_.georeference.system.body;
+      body = body_of(target, std::nullopt);
+      if (body.empty()) body = capitalised(target);
+      return;
     }
-    const std::optional<double> stored = void_value_as_stored(info_.sample_type, *number);
-    if (!stored) {
-      info_.warnings.push_back(loss(fmt::format("{} is {}, which no {} sample can hold; it is left aside", key,
-                                                value.text, to_string(info_.sample_type))));
-    } else if (std::find(info_.void_values.begin(), info_.void_values.end(), *stored) == info_.void_values.end()) {
-      info_.void_values.push_back(*stored);
+    const LabelBlock& label = *maps.front();
+    const auto number = [&](const char* key, double otherwise = 0.0) { return label.number(key).value_or(otherwise); };
+    const auto length = [&](const char* key) {
+      const auto metres = label.metres(key, "km");
+      return metres && *metres > 0.0 ? metres : std::nullopt;
+    };
+    const double east = label.word("POSITIVE_LONGITUDE_DIRECTION") == "WEST" ? -1.0 : 1.0;
+    const double centre_longitude = east * number("CENTER_LONGITUDE");
+    const double centre_latitude = number("CENTER_LATITUDE");
+    const std::string projection = spaced(label.word("MAP_PROJECTION_TYPE", "UNKNOWN PROJECTION"));
+    const bool is_simple = projection == "SIMPLE CYLINDRICAL";
+    const bool is_cylinder = is_simple || projection == "EQUIRECTANGULAR" || projection == "EQUIDISTANT CYLINDRICAL";
+    const double true_latitude = is_simple ? 0.0 : number("FIRST_STANDARD_PARALLEL", centre_latitude);
+    const bool is_degrees = is_cylinder && true_latitude == 0.0;
+    const std::string system = label.word("COORDINATE_SYSTEM_NAME", "PLANETOCENTRIC");
+
+    PlanetaryMap map;
+    map.name = is_degrees ? target + ' ' + system : projection + ' ' + target;
+    if (!is_degrees) map.projection = projection;
+    map.target = capitalised(target);
+    map.equatorial_radius_m = length("A_AXIS_RADIUS");
+    map.polar_radius_m = length("C_AXIS_RADIUS");
+    map.planetographic = system == "PLANETOGRAPHIC";
+    map.longitude = centre_longitude;
+    map.latitude = is_cylinder ? true_latitude : centre_latitude;
+    map.parallel_1 = number("FIRST_STANDARD_PARALLEL");
+    map.parallel_2 = number("SECOND_STANDARD_PARALLEL");
+    map.pole = {east * number("OBLIQUE_PROJ_POLE_LONGITUDE"), number("OBLIQUE_PROJ_POLE_LATITUDE", 90.0)};
+    map.pole_rotation = number("OBLIQUE_PROJ_POLE_ROTATION");
+    take_planetary_map(map, info_);
+    if (number("MAP_PROJECTION_ROTATION") != 0.0) return lose_place("the map is rotated");
+
+    const std::string unit = label.unit("MAP_RESOLUTION");
+    const bool is_per_degree = unit.empty() || unit.find("/deg") != std::string::npos;
+    // 0 stands for what the label does not say.
+    const double resolution = is_per_degree ? std::max(0.0, number("MAP_RESOLUTION")) : 0.0;
+    const double scale = length("MAP_SCALE").value_or(0.0);
+    const double radius = map.equatorial_radius_m.value_or(0.0);
+    const double spacing = is_degrees    ? (resolution > 0.0 ? 1.0 / resolution : scale / (radius * kDegree))
+                           : scale > 0.0 ? scale
+                                         : radius * kDegree / resolution;
+    if (!(spacing > 0.0 && std::isfinite(spacing)))
+      return lose_place("the label gives no MAP_RESOLUTION in pixels per degree and no MAP_SCALE");
+    Georeference& geo = info_.georeference;
+    geo.spacing_x = geo.spacing_y = spacing;
+    geo.registration = Registration::kArea;
+
+    const Middle middle{is_degrees ? centre_longitude : 0.0, {0.0, is_simple ? centre_latitude : 0.0}};
+    Edges edges;
+    if (is_cylinder) {
+      // The radius that the label itself uses: HiRISE's is that of the ellipsoid at the true latitude.
+      const double used = resolution > 0.0 && scale > 0.0 ? scale * resolution / kDegree : radius;
+      const double to_y = is_degrees ? 1.0 : used * kDegree;
+      const double to_x = to_y * std::cos(true_latitude * kDegree);
+      const auto find = [&](const char* key, double factor, double from, double to, double to_unit) {
+        const auto degrees = label.number(key);
+        return degrees ? std::optional((factor * *degrees - from) * to_unit + to) : std::nullopt;
+      };
+      edges = {find("WESTERNMOST_LONGITUDE", east, centre_longitude, middle.x, to_x),
+               find("EASTERNMOST_LONGITUDE", east, centre_longitude, middle.x, to_x),
+               find("MAXIMUM_LATITUDE", 1.0, 0.0, 0.0, to_y), find("MINIMUM_LATITUDE", 1.0, 0.0, 0.0, to_y),
+               360.0 * to_x};
     }
+    const auto line = label.number("LINE_PROJECTION_OFFSET");
+    const auto sample = label.number("SAMPLE_PROJECTION_OFFSET");
+    if (line && sample) {
+      place_by_offsets({*sample, *line}, middle, edges);
+    } else {
+      place_by_edges(edges);
+    }
+    if (is_degrees && geo.has_origin) choose_turn(edges.west);
   }
 
-  std::string label_path_;
-  Pds3Layout image_;
-  std::string data_path_;
-  std::uint64_t image_bytes_ = 0;  // where ^IMAGE points
-  int pointer_line_ = 0;
+  /// The projection offsets count from the middle of sample (1, 1); MOLA's labels count that sample as 1 instead, and old
+  /// ones turn the sign. MAXIMUM_LATITUDE and WESTERNMOST_LONGITUDE, which name edges of pixels, tell which is meant.
+  void place_by_offsets(const MapPoint& offsets, const Middle& middle, const Edges& edges) {
+    Georeference& geo = info_.georeference;
+    const double spacing = geo.spacing_x;
+    const auto [sample, line] = offsets;
+    // The first sample from the middle, in samples; the standard's way comes first.
+    const std::array<MapPoint, 3> ways = {{{-sample, line}, {1.0 - sample, line - 1.0}, {sample, -line}}};
+    const auto first = [&](const MapPoint& way, double base) {
+      return MapPoint{middle.x + way.easting * spacing, base + way.northing * spacing};
+    };
+    MapPoint chosen = first(ways[0], middle.y[0]);
+    if (edges.west && edges.north) {
+      double least = INFINITY;
+      MapPoint nearest;
+      for (const MapPoint& way : ways) {
+        for (const double base : middle.y) {
+          const MapPoint point = first(way, base);
+          const double off_x = std::remainder(point.easting - spacing / 2.0 - *edges.west, edges.turn);
+          const double off_y = point.northing + spacing / 2.0 - *edges.north;
+          const double distance = std::max(std::abs(off_x), std::abs(off_y)) / spacing;
+          if (distance < least) std::tie(least, nearest) = std::tuple(distance, point);
+        }
+      }
+      if (least <= kSamePlace) {
+        chosen = nearest;
+      } else {
+        info_.warnings.emplace_back(
+            fmt::format("LINE_ and SAMPLE_PROJECTION_OFFSET lie {:.2f} samples or more off MAXIMUM_LATITUDE and "
+                        "WESTERNMOST_LONGITUDE; the offsets are followed",
+                        least));
+      }
+    } else {
+      // A map round its own middle tells by its size alone.
+      const auto is_half = [&](double one) {
+        return 2.0 * sample == static_cast<double>(info_.width) + one &&
+               2.0 * line == static_cast<double>(info_.height) + one;
+      };
+      if (is_half(1.0)) {
+        chosen = first(ways[1], middle.y[0]);
+      } else if (!is_half(-1.0)) {
+        info_.warnings.emplace_back(
+            "nothing in the label confirms LINE_ and SAMPLE_PROJECTION_OFFSET; they are taken from the middle of the "
+            "first sample");
+      }
+    }
+    geo.has_origin = true;
+    geo.origin_x = chosen.easting;
+    geo.origin_y = chosen.northing;
+  }
+
+  void place_by_edges(const Edges& edges) {
+    Georeference& geo = info_.georeference;
+    const double spacing = geo.spacing_x;
+    const auto span = [&](std::int64_t columns, std::int64_t rows) {
+      const double width = static_cast<double>(columns) * spacing;
+      return std::abs(std::remainder(*edges.east - *edges.west - width, edges.turn)) <= kSamePlace * spacing &&
+             std::abs(*edges.north - *edges.south - static_cast<double>(rows) * spacing) <= kSamePlace * spacing;
+    };
+    const bool are_there = edges.west && edges.east && edges.north && edges.south;
+    const bool is_area = are_there && span(info_.width, info_.height);
+    if (!is_area && !(are_there && span(info_.width - 1, info_.height - 1))) {
+      info_.warnings.push_back(
+          loss(fmt::format("the label gives no projection offsets, and no bounds that span {} x {} samples; the origin "
+                           "is unknown",
+                           info_.width, info_.height)));
+      return;
+    }
+    if (!is_area) geo.registration = Registration::kPoint;
+    geo.has_origin = true;
+    geo.origin_x = *edges.west + (is_area ? spacing / 2.0 : 0.0);
+    geo.origin_y = *edges.north - (is_area ? spacing / 2.0 : 0.0);
+  }
+
+  /// The turn of longitude that the label's bounds name; within [-180, 360) where they name none.
+  void choose_turn(const std::optional<double>& west) {
+    double& x = info_.georeference.origin_x;
+    if (west && *west >= -180.0 && *west < 360.0) {
+      x += 360.0 * std::round((*west - x) / 360.0);
+    } else if (x < -180.0 || x >= 360.0) {
+      x -= 360.0 * std::floor((x + 180.0) / 360.0);
+    }
+  }
 };
 
-}  // namespace
+bool begins_with_label(const std::string& path) {
+  std::array<std::byte, 128> head = {};
+  return kPds3Format.recognises(std::span(head).first(RawFile(path).read_some(0, head)));
+}
+
+/// The label beside a file of samples, NAME.lbl or, of JPEG 2000, NAME_jp2.lbl, in any case; empty where there is none.
+std::string label_beside(const std::string& path) {
+  const std::string stem = std::filesystem::path(path).stem().string();
+  for (const char* ending : {".lbl", "_jp2.lbl"}) {
+    const std::string label = file_beside(path, stem + ending);
+    if (!label.empty() && begins_with_label(label)) return label;
+  }
+  return {};
+}
 
 bool looks_like_pds3(std::span<const std::byte> head) {
   std::string_view text = text_of(head);
@@ -581,27 +421,46 @@ bool looks_like_pds3(std::span<const std::byte> head) {
     while (!text.empty() && std::isspace(static_cast<unsigned char>(text.front())) != 0) text.remove_prefix(1);
   };
   skip_blank();
-  if (text.substr(0, 4) == "CCSD" || text.substr(0, 4) == "NJPL") {
+  if (text.starts_with("CCSD") || text.starts_with("NJPL")) {
     text.remove_prefix(std::min(text.find('\n'), text.size()));
     skip_blank();
   }
-  return text.substr(0, 14) == "PDS_VERSION_ID";
+  return text.starts_with("PDS_VERSION_ID");
 }
 
 bool has_pds3_label(const std::string& path) {
-  if (lower_case(std::filesystem::path(path).extension().string()) != ".img") return false;
-  std::array<std::byte, 128> head = {};
-  const auto is_label = [&](const std::string& file) {
-    const RawFile raw(file);
-    return looks_like_pds3(std::span(head).first(raw.read_some(0, head)));
-  };
-  if (is_label(path)) return false;
-  const std::string label = file_beside(path, std::filesystem::path(path).stem().string() + ".lbl");
-  return !label.empty() && is_label(label);
+  return lower_case(path).ends_with(".img") && !begins_with_label(path) && !label_beside(path).empty();
 }
 
 std::unique_ptr<HeightSource> open_pds3(const std::string& path, const OpenOptions& options) {
-  return std::make_unique<Pds3Source>(path, options);
+  const std::string label = has_pds3_label(path) ? label_beside(path) : std::string();
+  const Product product = read_product(label.empty() ? path : label);
+  std::error_code ignored;
+  if (!label.empty() && !std::filesystem::equivalent(path, product.data, ignored)) {
+    throw Error(ErrorCode::kUnsupported,
+                fmt::format("{}: its label {} describes {} instead", path, label, product.data));
+  }
+  return std::make_unique<Pds3Source>(product, options);
+}
+
+}  // namespace
+
+const Format kPds3Format = {.name = "PDS3",
+                            .extensions = {".img", ".lbl"},
+                            .note = "takes `channel`",
+                            .open = open_pds3,
+                            .recognises = looks_like_pds3,
+                            .described = has_pds3_label};
+
+std::string jpeg2000_help(const std::string& path) {
+  const std::string label = label_beside(path);
+  if (label.empty()) return {};
+  try {
+    (void)open_pds3(label, {});
+    return fmt::format("its samples are unpacked already: open {}", label);
+  } catch (const Error& error) {
+    return error.parts().remedy;
+  }
 }
 
 }  // namespace isohf

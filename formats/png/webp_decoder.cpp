@@ -1,46 +1,26 @@
 #include <webp/decode.h>
 
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
+#include <algorithm>
 #include <string>
 
-#include "formats/io/text.h"
 #include "formats/png/png_decoder.h"
 #include "formats/readers.h"
+#include "isohf/base/text/text.h"
 
 namespace isohf {
-namespace {
 
-const std::uint8_t* bytes_of(std::span<const std::byte> stored) {
-  return reinterpret_cast<const std::uint8_t*>(stored.data());
-}
-
-}  // namespace
-
-bool WebpDecoder::open(const std::string& path, PngHeader& header) {
-  is_open_ = false;
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  std::ifstream in(path, std::ios::binary);
-  if (error || !in) return fail(std::strerror(error ? error.value() : errno));
-  file_.resize(static_cast<std::size_t>(std::min<std::uintmax_t>(size, kMaxInterlacedBytes)));
-  in.read(reinterpret_cast<char*>(file_.data()), static_cast<std::streamsize>(file_.size()));
-  file_.resize(static_cast<std::size_t>(in.gcount()));
-  return open(std::span<const std::byte>(file_), header);
-}
-
-bool WebpDecoder::open(std::span<const std::byte> stored, PngHeader& header) {
-  stored_ = stored;
-  is_open_ = true;
+bool WebpDecoder::read_header(PngHeader& header) {
+  std::fseek(file(), 0, SEEK_END);
+  const std::int64_t size = std::ftell(file());
+  std::rewind(file());
+  stored_.resize(static_cast<std::size_t>(std::clamp<std::int64_t>(size, 0, kMaxInterlacedBytes)));
+  stored_.resize(std::fread(stored_.data(), 1, stored_.size(), file()));
   WebPBitstreamFeatures found{};
-  const VP8StatusCode status = WebPGetFeatures(bytes_of(stored), stored.size(), &found);
+  const VP8StatusCode status = WebPGetFeatures(stored_.data(), stored_.size(), &found);
   if (status == VP8_STATUS_NOT_ENOUGH_DATA) return fail("ends early");
   if (status != VP8_STATUS_OK) return fail("is damaged");
   if (found.has_animation != 0) return fail("is an animation");
   constexpr int kLossless = 2;
-  header = {};
   header.width = static_cast<std::uint32_t>(found.width);
   header.height = static_cast<std::uint32_t>(found.height);
   header.bit_depth = 8;
@@ -55,9 +35,9 @@ bool WebpDecoder::open(std::span<const std::byte> stored, PngHeader& header) {
 bool WebpDecoder::read_picture(std::span<std::byte> picture, const PngHeader& header) {
   auto* const out = reinterpret_cast<std::uint8_t*>(picture.data());
   const auto decode = header.channels.size() == 4 ? WebPDecodeRGBAInto : WebPDecodeRGBInto;
-  if (decode(bytes_of(stored_), stored_.size(), out, picture.size(), static_cast<int>(header.row_bytes)) == nullptr)
-    return fail("is damaged or cut off");
-  return true;
+  const auto row_bytes = static_cast<int>(header.row_bytes);
+  return decode(stored_.data(), stored_.size(), out, picture.size(), row_bytes) != nullptr ||
+         fail("is damaged or cut off");
 }
 
 bool looks_like_webp(std::span<const std::byte> head) {

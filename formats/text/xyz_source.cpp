@@ -1,8 +1,7 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -13,135 +12,187 @@
 #include <unordered_map>
 #include <vector>
 
-#include "formats/georeference/files_beside.h"
+#include "formats/georeference/sidecars.h"
 #include "formats/grids/plain_samples.h"
 #include "formats/io/bands.h"
-#include "formats/io/text.h"
 #include "formats/io/text_tokens.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
-#include "isohf/base/bytes.h"
 #include "isohf/base/file.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
 namespace isohf {
 namespace {
 
-constexpr std::size_t kLongestLine = 4096;
-constexpr std::size_t kMostFields = 32;
+/// The int32 sample of a place without a point.
 constexpr std::int32_t kNoWhole = std::numeric_limits<std::int32_t>::min();
 /// Coordinates nearer than this are one: a tenth of a micrometre, or a hundredth of a metre in degrees.
 constexpr double kSame = 1e-7;
-/// Columns and rows are told apart by so many coordinates each.
+/// The most different x, and y.
 constexpr std::size_t kMostCoordinates = std::size_t{1} << 20U;
-/// Off the grid by more than this is no rounding, in spacings.
+/// Coordinates farther off the grid than this are not rounded ones, in spacings.
 constexpr double kOffSpacing = 0.1;
 constexpr double kMostCellsToAPoint = 16.0;
-
-/// The fields of a line between blanks and one separator; where that is a semicolon, numbers may have decimal commas.
-struct Fields {
-  std::array<std::string_view, kMostFields> text;
-  std::size_t count = 0;
-
-  explicit Fields(std::string_view line) {
-    const char separator = line.find(';') != std::string_view::npos ? ';' : ',';
-    const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '"'; };
-    const char* at = line.data();
-    const char* const end = at + line.size();
-    while (count < kMostFields) {
-      while (at != end && blank(*at)) ++at;
-      if (at == end) return;
-      const char* const begin = at;
-      while (at != end && !blank(*at) && *at != separator) ++at;
-      text[count++] = {begin, static_cast<std::size_t>(at - begin)};
-      while (at != end && blank(*at)) ++at;
-      if (at != end && *at == separator) ++at;
-    }
-  }
-};
+constexpr double kFarthestCoordinate = 1e11;
 
 bool is_number(std::string_view text) {
   double value = 0.0;
   return read_decimal(text, value);
 }
 
-bool is_comment(std::string_view line) {
-  const std::size_t first = line.find_first_not_of(" \t\r");
-  return first == std::string_view::npos || line[first] == '#' || line.substr(first, 2) == "//";
+/// Elevation of a point, NaN for a word that means nodata; false for anything else.
+bool read_elevation(std::string_view text, double& value) {
+  constexpr std::array<std::string_view, 7> kNodata = {"", "na", "n/a", "null", "none", "nodata", "--"};
+  if (read_decimal(text, value)) return true;
+  value = std::numeric_limits<double>::quiet_NaN();
+  return std::ranges::find(kNodata, lower_case(text.substr(0, 8))) != kNodata.end();
 }
 
-/// Which fields are x, y and z.
-struct Columns {
-  std::array<std::size_t, 3> at = {0, 1, 2};
-  bool is_header = false;  ///< names them
-  bool in_degrees = false;
+bool is_comment(std::string_view line) {
+  const std::size_t first = line.find_first_not_of(" \t\r");
+  return first == line.npos || std::string_view("#!%").find(line[first]) != std::string_view::npos ||
+         line.substr(first, 2) == "//";
+}
 
-  /// What a first line says of those that follow; nullopt where it is none of a grid's.
-  static std::optional<Columns> of(std::string_view line) {
-    static constexpr std::array<std::array<std::string_view, 6>, 3> kNames = {
-        {{"x", "lon", "long", "longitude", "easting", "e"},
-         {"y", "lat", "latitude", "northing", "n", ""},
-         {"z", "elevation", "height", "altitude", "elev", "h"}}};
-    const Fields fields(line);
-    Columns columns;
-    if (fields.count >= 3 && std::all_of(fields.text.begin(), fields.text.begin() + 3, is_number)) return columns;
-    columns.is_header = true;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      bool found = false;
-      for (std::size_t i = 0; i < fields.count && !found; ++i) {
-        const std::string name = lower_case(fields.text[i]);
-        found = std::ranges::find(kNames[axis], name) != kNames[axis].end();
-        if (found) columns.at[axis] = i;
-        if (found && axis == 0) columns.in_degrees = name.starts_with("lon");
-      }
-      if (!found) return std::nullopt;
-    }
-    return columns;
-  }
-};
-
-/// The lines of a text that hold something, one after the other.
-class Lines {
+/// The fields of a line, one after the other, without the blanks and quotes around them.
+class Fields {
  public:
-  explicit Lines(const RawFile& file) : file_(file), buffer_(std::size_t{1} << 18U) {}
+  /// separator  ';', ',' or '\t'; ' ' for any blanks
+  Fields(std::string_view line, char separator)
+      : at_(line.data()), end_(at_ + line.size()), separator_(separator), is_due_(separator != ' ') {}
 
-  bool next(std::string_view& line) {
-    for (;;) {
-      const auto* end = static_cast<const char*>(std::memchr(buffer_.data() + at_, '\n', filled_ - at_));
-      if (end == nullptr && fill()) continue;
-      const std::size_t stop = end == nullptr ? filled_ : static_cast<std::size_t>(end - buffer_.data());
-      if (end == nullptr && stop == at_) return false;
-      ++number_;
-      line = {buffer_.data() + at_, stop - at_};
-      at_ = std::min(stop + 1, filled_);
-      if (line.size() > kLongestLine) {
-        throw Error(ErrorCode::kCorrupt,
-                    fmt::format("{}: line {} is longer than {} bytes", file_.path(), number_, kLongestLine));
-      }
-      if (!is_comment(line)) return true;
-    }
+  bool next(std::string_view& field) {
+    skip_blanks();
+    if (at_ == end_ && !is_due_) return false;
+    const char* const begin = at_;
+    while (at_ != end_ && (separator_ == ' ' ? !is_blank(*at_) : *at_ != separator_)) ++at_;
+    const char* stop = at_;
+    while (stop != begin && is_blank(stop[-1])) --stop;
+    field = {begin, static_cast<std::size_t>(stop - begin)};
+    skip_blanks();
+    is_due_ = separator_ != ' ' && at_ != end_ && *at_ == separator_;
+    if (is_due_) ++at_;
+    return true;
   }
-  [[nodiscard]] std::uint64_t number() const { return number_; }
+
+  static std::vector<std::string_view> all(std::string_view line, char separator) {
+    std::vector<std::string_view> list;
+    Fields fields(line, separator);
+    for (std::string_view field; fields.next(field);) list.push_back(field);
+    return list;
+  }
 
  private:
-  bool fill() {
-    if (at_ == 0 && filled_ == buffer_.size()) return false;  // one line, which is too long
-    std::memmove(buffer_.data(), buffer_.data() + at_, filled_ - at_);
-    filled_ -= at_;
-    at_ = 0;
-    const std::size_t got = file_.read_some(read_, std::as_writable_bytes(std::span(buffer_).subspan(filled_)));
-    read_ += got;
-    filled_ += got;
-    return got > 0;
+  [[nodiscard]] bool is_blank(char c) const {
+    return c == ' ' || c == '\r' || c == '"' || (c == '\t' && separator_ != '\t');
+  }
+  void skip_blanks() {
+    while (at_ != end_ && is_blank(*at_)) ++at_;
   }
 
-  const RawFile& file_;
-  std::vector<char> buffer_;
-  std::size_t at_ = 0;
-  std::size_t filled_ = 0;
-  std::uint64_t read_ = 0;
-  std::uint64_t number_ = 0;
+  const char* at_;
+  const char* end_;
+  char separator_;
+  bool is_due_;  ///< a field follows, though it may be empty
+};
+
+struct Point {
+  double x = 0.0;
+  double y = 0.0;
+  std::string_view z;
+};
+
+/// Which fields of a line are x, y and z, and what keeps fields apart.
+struct Columns {
+  std::array<std::size_t, 3> at = {0, 1, 2};
+  char separator = ' ';
+  bool is_named = false;    ///< by a line before the first point
+  bool is_guessed = false;  ///< that line names neither x nor y
+  bool has_commas = false;  ///< between blanks, as decimal signs
+  bool in_degrees = false;
+  std::string note;  ///< how names were understood, if not all are known
+
+  enum class Line { kPassed, kPoint, kForeign };
+  /// Takes the lines of a text up to its first point: comments and a line of names may be before it.
+  Line begin(std::string_view line) {
+    if (is_comment(line)) return Line::kPassed;
+    if (find_separator(line)) return Line::kPoint;
+    is_named = !is_named && name(line);
+    return is_named ? Line::kPassed : Line::kForeign;
+  }
+
+  /// False if the line is not a point.
+  bool read(std::string_view line, Point& point) const {
+    std::array<std::string_view, 3> found;
+    const std::size_t last = std::ranges::max(at);
+    Fields fields(line, separator);
+    std::string_view field;
+    for (std::size_t i = 0; i <= last; ++i) {
+      if (!fields.next(field)) return false;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (at[axis] == i) found[axis] = field;
+      }
+    }
+    point.z = found[2];
+    return read_decimal(found[0], point.x) && read_decimal(found[1], point.y) &&
+           std::abs(point.x) < kFarthestCoordinate && std::abs(point.y) < kFarthestCoordinate;
+  }
+
+ private:
+  /// Whether a line is a point with some separator. Commas between blanks are decimal signs if that makes numbers of all
+  /// three fields.
+  bool find_separator(std::string_view line) {
+    Point point;
+    double z = 0.0;
+    return std::ranges::any_of(std::string_view("; ,"), [&](char candidate) {
+      separator = candidate;
+      const bool is_possible = candidate == ' ' ? line.find(" ,") == line.npos : line.find(candidate) != line.npos;
+      has_commas = candidate == ' ' && line.find(',') != line.npos;
+      return is_possible && read(line, point) && read_elevation(point.z, z);
+    });
+  }
+
+  /// Takes the columns from a line of names. x and y alone: z is behind both, or the third of three. Without them the
+  /// first three columns are x, y and z, as GDAL has it. False if it is no such line, or if names contradict that.
+  bool name(std::string_view line) {
+    static constexpr std::array<std::array<std::string_view, 8>, 3> kNames = {
+        {{"x", "lon", "long", "longitude", "easting", "east", "e", "rechtswert"},
+         {"y", "lat", "latitude", "northing", "north", "n", "hochwert", "y"},
+         {"z", "elevation", "height", "altitude", "elev", "alt", "hoehe", "h"}}};
+    char between = ' ';
+    for (const char candidate : {'\t', ',', ';'}) between = line.find(candidate) == line.npos ? between : candidate;
+    std::vector<std::string_view> fields = Fields::all(line, between);
+    std::erase_if(fields, [](std::string_view unit) { return unit.starts_with('[') || unit.starts_with('('); });
+    if (fields.size() < 3 || std::ranges::any_of(fields, is_number)) return false;
+    std::array<std::optional<std::size_t>, 3> found;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (const std::string_view wanted : kNames[axis]) {
+        for (std::size_t i = 0; i < fields.size() && !found[axis]; ++i) {
+          std::string known = lower_case(fields[i]);  // without what follows: "z [m]", "elevation_m"
+          if (known.starts_with("point_")) known.erase(0, 6);
+          known.resize(std::min(known.find_first_of(" _-.([0123456789"), known.size()));
+          if (known == wanted) found[axis] = i;
+        }
+      }
+    }
+    auto& [x, y, z] = found;
+    is_guessed = !x || !y;
+    const bool are_all_known = x && y && z;
+    const std::size_t behind = is_guessed ? 2 : std::max(*x, *y) + 1;
+    if (is_guessed && x.value_or(0) == 0 && y.value_or(1) == 1 && z.value_or(2) == 2) found = {0, 1, 2};
+    if (x && y && !z && (behind < fields.size() || fields.size() == 3))
+      z = behind < fields.size() ? behind : 3 - *x - *y;
+    if (!x || !y || !z) return false;
+    at = {*x, *y, *z};
+    in_degrees = lower_case(fields[*x]).starts_with("lon");
+    if (!are_all_known) {
+      note = fmt::format("the columns \"{}\", \"{}\" and \"{}\" are read as x, y and z", printable(fields[*x]),
+                         printable(fields[*y]), printable(fields[*z]));
+    }
+    return true;
+  }
 };
 
 /// The coordinates of one axis, each with the line that has it first; evenly spaced ones once they are all there.
@@ -151,13 +202,11 @@ class Axis {
 
   void see(double value, std::uint64_t line) {
     const std::int64_t key = std::llround(value / kSame);
-    if (!seen_.empty()) {
-      if (key == seen_[last_].key) return;
-      const std::size_t next = last_ + 1 == seen_.size() ? 0 : last_ + 1;  // as on the row before
-      if (key == seen_[next].key) {
-        last_ = next;
-        return;
-      }
+    if (!seen_.empty() && key == seen_[last_].key) return;
+    const std::size_t next = last_ + 1 < seen_.size() ? last_ + 1 : 0;  // as on the row before
+    if (!seen_.empty() && key == seen_[next].key) {
+      last_ = next;
+      return;
     }
     const auto [found, is_new] = index_.try_emplace(key, seen_.size());
     last_ = found->second;
@@ -182,10 +231,9 @@ class Axis {
     step_ = (seen_.back().value - first_) / steps;
     if (!(steps < 0x1p31)) refuse(seen_[1].line, fmt::format("has {} {}, on no regular grid", name_, seen_[1].value));
     count_ = static_cast<std::int64_t>(steps) + 1;
-    // What lies off the grid of the nearest two is at fault, where one does: it has bent the other grid.
+    // A coordinate off the grid of the nearest two is at fault, if there is one: it has bent the other grid.
     if (off_grid(step_) != nullptr) {
-      const Seen* const by_least = off_grid(least);
-      const double spacing = by_least != nullptr ? least : step_;
+      const double spacing = off_grid(least) != nullptr ? least : step_;
       const Seen& each = *off_grid(spacing);
       refuse(each.line, fmt::format("has {} {}, {:.2f} spacings of {} off the grid", name_, each.value,
                                     std::abs(std::remainder((each.value - first_) / spacing, 1.0)), spacing));
@@ -206,7 +254,7 @@ class Axis {
     std::uint64_t line;
   };
 
-  /// The first coordinate that lies between those of a spacing; nullptr where none does.
+  /// The first coordinate that is between those of a spacing; nullptr if none is.
   [[nodiscard]] const Seen* off_grid(double spacing) const {
     const auto found = std::ranges::find_if(seen_, [&](const Seen& each) {
       return std::abs(std::remainder((each.value - first_) / spacing, 1.0)) > kOffSpacing;
@@ -234,7 +282,7 @@ class XyzSource final : public PlainSource {
  public:
   XyzSource(const std::string& path, const OpenOptions& options) : PlainSource(path, "XYZ text") {
     (void)choose_band(info_, options, 1);
-    const RawFile text(path, options.unpacked_bytes);
+    const RawFile text(path);
     Axis x(path, 'x');
     Axis y(path, 'y');
     survey(text, x, y);
@@ -246,30 +294,36 @@ class XyzSource final : public PlainSource {
            fmt::format("its {} points are few of {} x {}; isohf reads points of a regular grid (gdal_grid makes one)",
                        points_, info_.width, info_.height));
     }
-    info_.sample_type = whole_ ? SampleType::kInt32 : SampleType::kFloat64;
+    info_.sample_type = is_whole_ ? SampleType::kInt32 : SampleType::kFloat64;
     const auto size = static_cast<std::uint64_t>(size_bytes(info_.sample_type));
-    layout_.from_south = true;
     if (by_columns_) {
       layout_.row_bytes = size;
       layout_.column_bytes = size * static_cast<std::uint64_t>(info_.height);
     }
-    if (whole_) {
-      scatter<std::int32_t>(text, x, y, kNoWhole);
-    } else {
-      scatter<double>(text, x, y, std::numeric_limits<double>::quiet_NaN());
+    const std::uint64_t again = is_whole_ ? scatter<std::int32_t>(text, x, y, kNoWhole)
+                                          : scatter<double>(text, x, y, std::numeric_limits<double>::quiet_NaN());
+    if (again > 0) {
+      info_.warnings.push_back(
+          loss(fmt::format("{} points come again with other elevations; the last one of each place is read", again)));
+    }
+    std::string last(1, '\0');
+    (void)text.read_some(text.size_bytes() - 1, std::as_writable_bytes(std::span(last)));
+    if (last != "\n" && static_cast<double>(points_) < cells) {
+      info_.warnings.push_back(
+          loss(fmt::format("the text ends within a line, and {} x {} places have {} points: it may be cut off",
+                           info_.width, info_.height, points_)));
     }
     Georeference& place = info_.georeference;
     place.registration = Registration::kPoint;
-    if (columns_.in_degrees) place.unit = HorizontalUnit::kDegree;
     place.spacing_x = x.step();
     place.spacing_y = y.step();
     place.has_origin = true;
     place.origin_x = x.first();
     place.origin_y = y.first() + static_cast<double>(info_.height - 1) * y.step();
-    read_files_beside(info_, 1);
-    if (whole_) {
+    read_sidecars(info_, 1);
+    if (is_whole_) {
       info_.void_values.insert(info_.void_values.begin(), static_cast<double>(kNoWhole));
-      info_.valid_min = static_cast<double>(kNoWhole) + 1.0;  // void whatever `void_values` say
+      info_.valid_min = static_cast<double>(kNoWhole) + 1.0;  // nodata whatever `void_values` say
     }
     info_.block_width = info_.width;
     info_.block_height = by_columns_ ? std::min<std::int64_t>(info_.height, 64) : 1;
@@ -277,149 +331,157 @@ class XyzSource final : public PlainSource {
   }
 
  private:
-  struct Point {
-    double x = 0.0;
-    double y = 0.0;
-    std::string_view z;
-  };
-
-  Point point_of(std::string_view line, std::uint64_t number) const {
-    const Fields fields(line);
+  /// Calls use(point, number of its line) for each point; notes what the first lines say.
+  template <typename Use>
+  void for_each_point(const RawFile& text, const Use& use) {
+    TextTokens lines(text);
+    columns_ = {};
+    auto kind = Columns::Line::kPassed;
+    std::string_view line;
+    std::uint64_t number = 0;
     Point point;
-    const std::size_t last = std::ranges::max(columns_.at);
-    if (last >= fields.count || !read_decimal(fields.text[columns_.at[0]], point.x) ||
-        !read_decimal(fields.text[columns_.at[1]], point.y) || !(std::abs(point.x) < 1e11) ||
-        !(std::abs(point.y) < 1e11)) {
-      fail(ErrorCode::kCorrupt, fmt::format("line {} is \"{}\", must be x, y and z", number, printable(line)));
+    while (lines.next_line(line)) {
+      if (++number == 1) line = without_byte_order_mark(line);
+      if (kind != Columns::Line::kPoint) {
+        kind = columns_.begin(line);
+        if (kind == Columns::Line::kPassed) continue;
+      } else if (is_comment(line)) {
+        continue;
+      }
+      const bool is_foreign = kind == Columns::Line::kForeign;
+      if (is_foreign || !columns_.read(line, point) || !use(point, number)) {
+        fail(ErrorCode::kCorrupt, fmt::format("line {} is \"{}\", must be x, y and z{}", number, printable(line),
+                                              is_foreign ? ", or their names" : ""));
+      }
     }
-    point.z = fields.text[columns_.at[2]];
-    return point;
   }
 
-  /// Goes through all points once: where they lie, and whether their elevations are whole.
+  /// Goes through all points once: where they are, and whether their elevations are whole.
   void survey(const RawFile& text, Axis& x, Axis& y) {
-    Lines lines(text);
-    std::string_view line;
-    double first_x = 0.0;
-    bool is_first = true;
-    while (lines.next(line)) {
-      if (is_first) {
-        const std::optional<Columns> columns = Columns::of(line);
-        if (!columns)
-          fail(ErrorCode::kCorrupt,
-               fmt::format("line {} is \"{}\", must be x, y and z", lines.number(), printable(line)));
-        columns_ = *columns;
-        is_first = false;
-        if (columns_.is_header) continue;
-      }
-      const Point point = point_of(line, lines.number());
-      x.see(point.x, lines.number());
-      y.see(point.y, lines.number());
-      if (whole_) whole_ = is_whole(point.z);
-      if (points_ == 0) first_x = point.x;
-      if (points_ == 1) by_columns_ = std::abs(point.x - first_x) < kSame;
+    Point first;
+    std::int32_t whole = 0;
+    for_each_point(text, [&](const Point& point, std::uint64_t line) {
+      x.see(point.x, line);
+      y.see(point.y, line);
+      is_whole_ = is_whole_ && read_whole(point.z, whole) && whole != kNoWhole;
+      if (points_ == 0) first = point;
+      if (points_ == 1) by_columns_ = std::abs(point.x - first.x) < kSame;
+      layout_.from_south = point.y > first.y;  // of the last one
       ++points_;
-    }
+      return true;
+    });
     if (points_ < 4) fail(ErrorCode::kCorrupt, fmt::format("has {} points, a grid has four at least", points_));
+    if (!columns_.note.empty()) info_.warnings.emplace_back(columns_.note);
+    if (columns_.has_commas) info_.warnings.emplace_back("commas between blanks are decimal signs: 1,5 is read as 1.5");
+    if (columns_.in_degrees) info_.georeference.unit = HorizontalUnit::kDegree;
     x.settle();
     y.settle();
   }
 
-  static bool is_whole(std::string_view z) {
-    std::int32_t value = 0;
-    if (!z.empty() && z.front() == '+') z.remove_prefix(1);
-    const auto [end, error] = std::from_chars(z.data(), z.data() + z.size(), value);
-    return error == std::errc{} && end == z.data() + z.size() && value != kNoWhole;
-  }
-
-  /// Goes through them again and puts each elevation in its cell of a file without a name.
+  /// Goes through them again and puts each elevation in its cell of a file without a name; `nothing` where no point is.
+  /// Returns the number of points at a place that had another elevation already.
   template <typename T>
-  void scatter(const RawFile& text, const Axis& x, const Axis& y, T nothing) {
-    const auto cells = static_cast<std::uint64_t>(info_.width) * static_cast<std::uint64_t>(info_.height);
+  std::uint64_t scatter(const RawFile& text, const Axis& x, const Axis& y, T nothing) {
+    constexpr std::uint64_t kAtOnce = std::uint64_t{1} << 17U;
+    const auto width = static_cast<std::uint64_t>(info_.width);
+    const auto height = static_cast<std::uint64_t>(info_.height);
+    const std::uint64_t cells = width * height;
     std::error_code error;
     const std::string folder = std::filesystem::temp_directory_path(error).string();
     if (error) fail(ErrorCode::kIo, "needs a folder for temporary files, and TMPDIR names none: " + error.message());
-    File cells_file = File::scratch(folder, cells * sizeof(T));
-    std::vector<T> run(std::min<std::uint64_t>(cells, std::uint64_t{1} << 17U), nothing);
-    const auto write = [&](std::uint64_t cell, std::size_t count) {
-      cells_file.write_at(cell * sizeof(T), std::as_bytes(std::span(run).first(count)));
-    };
+    File file = File::scratch(folder, cells * sizeof(T));
+    std::vector<T> run(std::min(cells, kAtOnce), nothing);
     for (std::uint64_t at = 0; at < cells; at += run.size()) {
-      write(at, static_cast<std::size_t>(std::min<std::uint64_t>(run.size(), cells - at)));
+      file.write_at(at * sizeof(T),
+                    std::as_bytes(std::span(run).first(std::min<std::uint64_t>(run.size(), cells - at))));
     }
-    Lines lines(text);
-    std::string_view line;
-    if (columns_.is_header) (void)lines.next(line);
-    std::uint64_t begin = 0;  // of the run, which is written once a point lies elsewhere
-    std::size_t count = 0;
-    std::uint64_t there = 0;
-    while (lines.next(line)) {
-      const Point point = point_of(line, lines.number());
+    using Elevation = std::pair<std::uint64_t, T>;  // with its cell
+    std::vector<Elevation> batch;
+    std::uint64_t again = 0;
+    const auto store = [&] {
+      constexpr std::uint64_t kGap = 512;  // cells that are rather read than left out
+      if (!std::ranges::is_sorted(batch, {}, &Elevation::first)) {
+        std::ranges::stable_sort(batch, {}, &Elevation::first);
+      }
+      for (std::size_t i = 0, end = 0; i < batch.size();) {
+        const std::uint64_t begin = batch[i].first;
+        for (end = i + 1; end < batch.size(); ++end) {
+          if (batch[end].first > batch[end - 1].first + kGap || batch[end].first >= begin + run.size()) break;
+        }
+        const auto there = std::span(run).first(batch[end - 1].first + 1 - begin);
+        (void)file.read_at(begin * sizeof(T), std::as_writable_bytes(there));
+        for (; i < end; ++i) {
+          T& cell = there[batch[i].first - begin];
+          const T value = batch[i].second;
+          if (value == nothing || value != value) continue;
+          again += cell == nothing || cell != cell || cell == value ? 0 : 1;
+          cell = value;
+        }
+        file.write_at(begin * sizeof(T), std::as_bytes(there));
+      }
+      batch.clear();
+    };
+    std::uint64_t count = 0;
+    for_each_point(text, [&](const Point& point, std::uint64_t) {
       double value = 0.0;
-      if (!read_decimal(point.z, value)) {
-        fail(ErrorCode::kCorrupt,
-             fmt::format("line {} is \"{}\", must be x, y and z", lines.number(), printable(line)));
-      }
+      if (!read_elevation(point.z, value)) return false;
       const auto column = static_cast<std::uint64_t>(x.cell(point.x));
-      const auto row = static_cast<std::uint64_t>(y.cell(point.y));
-      const std::uint64_t cell = by_columns_ ? column * static_cast<std::uint64_t>(info_.height) + row
-                                             : row * static_cast<std::uint64_t>(info_.width) + column;
-      if (cell >= cells || ++there > points_) fail(ErrorCode::kCorrupt, "has changed while it was read");
-      if (count == run.size() || cell != begin + count) {
-        write(begin, count);
-        begin = cell;
-        count = 0;
+      const auto from_south = static_cast<std::uint64_t>(y.cell(point.y));
+      if (column >= width || from_south >= height || ++count > points_) {
+        fail(ErrorCode::kCorrupt, "has changed while it was read");
       }
-      run[count++] = static_cast<T>(value);
-    }
-    write(begin, count);
-    file_.emplace(fmt::format("/proc/self/fd/{}", cells_file.descriptor()));
+      const std::uint64_t row = layout_.from_south ? from_south : height - 1 - from_south;
+      batch.emplace_back(by_columns_ ? column * height + row : row * width + column, static_cast<T>(value));
+      if (batch.size() == kAtOnce) store();
+      return true;
+    });
+    store();
+    file_.emplace(fmt::format("/proc/self/fd/{}", file.descriptor()));
+    return again;
   }
 
   Columns columns_;
-  bool whole_ = true;
+  bool is_whole_ = true;
   bool by_columns_ = false;
   std::uint64_t points_ = 0;
 };
 
-/// Whether the lines that are all there are points of three numbers, or of more where a line names them. Of a file that
-/// `is_named` so the first point tells, whatever else it has.
-bool are_points(std::string_view text, bool is_named) {
-  std::optional<Columns> columns;
-  int points = 0;
-  for (std::size_t at = 0, end = 0; (end = text.find('\n', at)) != std::string_view::npos; at = end + 1) {
-    const std::string_view line = text.substr(at, end - at);
-    if (is_comment(line)) continue;
-    if (!columns) {
-      columns = Columns::of(line);
-      if (!columns) return false;
-      if (columns->is_header) continue;
-    }
-    const Fields fields(line);
-    if (fields.count < 3 || (fields.count > 3 && !columns->is_header && !is_named)) return false;
-    for (const std::size_t i : columns->at) {
-      if (i >= fields.count || !is_number(fields.text[i])) return false;
-    }
-    if (++points >= (is_named ? 1 : 2)) return true;
-  }
-  return false;
-}
-
-}  // namespace
-
 bool looks_like_xyz(std::span<const std::byte> head) {
-  return are_points(text_of(head), false);
+  std::string_view text = without_byte_order_mark(text_of(head));
+  Columns columns;
+  Point point;
+  int points = 0;
+  for (std::size_t end = 0; (end = text.find('\n')) != text.npos && points < 2; text.remove_prefix(end + 1)) {
+    const std::string_view line = text.substr(0, end);
+    const auto kind = points == 0                 ? columns.begin(line)
+                      : is_comment(line)          ? Columns::Line::kPassed
+                      : columns.read(line, point) ? Columns::Line::kPoint
+                                                  : Columns::Line::kForeign;
+    if (kind == Columns::Line::kForeign || columns.is_guessed) return false;
+    if (kind == Columns::Line::kPassed) continue;
+    // Without names, text in more columns is anything.
+    const auto fields = Fields::all(line, columns.separator);
+    if (!columns.is_named && fields.size() > 3 && !fields[3].empty()) return false;
+    ++points;
+  }
+  return points == 2;
 }
 
 bool is_xyz(const std::string& path) {
-  if (!lower_case(without_gzip(path)).ends_with(".xyz")) return false;
-  std::string text(kLongestLine, '\0');
+  if (!lower_case(path).ends_with(".xyz")) return false;
+  std::string text(512, '\0');
   text.resize(RawFile(path).read_some(0, std::as_writable_bytes(std::span(text))));
-  return are_points(text, true);
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 && (c < '\t' || c > '\r'); };
+  return std::ranges::none_of(text, is_control);
 }
 
 std::unique_ptr<HeightSource> open_xyz(const std::string& path, const OpenOptions& options) {
   return std::make_unique<XyzSource>(path, options);
 }
+
+}  // namespace
+
+const Format kXyzFormat = {
+    .name = "XYZ text", .extensions = {".xyz"}, .open = open_xyz, .recognises = looks_like_xyz, .described = is_xyz};
 
 }  // namespace isohf

@@ -5,15 +5,11 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <charconv>
 #include <cstring>
-#include <exception>
 #include <limits>
 #include <memory>
-#include <nlohmann/json.hpp>
-#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -21,55 +17,46 @@
 
 #include "formats/io/block_cache.h"
 #include "formats/io/file_source.h"
-#include "formats/io/text.h"
 #include "formats/open_options.h"
 #include "formats/png/packed_elevations.h"
 #include "formats/png/png_decoder.h"
 #include "formats/readers.h"
-#include "formats/webtiles/tile_store.h"
+#include "formats/webtiles/pmtiles.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
 namespace isohf {
 namespace {
 
-/// Decoded tiles that are kept, where a row of them takes no more.
-constexpr std::uint64_t kMostKeptBytes = std::uint64_t{256} << 20U;
 /// Larger ones are no tiles.
 constexpr std::int64_t kMostSide = 8192;
-constexpr std::size_t kChannels = 4;
-
-/// A tile's pixels: red, green, blue and opacity.
-struct Pixels {
-  std::int64_t side = 0;
-  std::vector<std::byte> bytes;
-};
 
 class TileSource final : public HeightSource {
  public:
-  TileSource(const std::string& path, const char* format, std::unique_ptr<TileStore> store, const OpenOptions& options)
-      : store_(std::move(store)) {
+  TileSource(const std::string& path, const OpenOptions& options) : file_(path) {
     info_.path = path;
-    info_.format = format;
+    info_.format = "PMTiles";
     choose_zoom(options.part);
+    packing_ = choose_packing(options);
     side_ = pixels_of(box_.any).side;
     if (!std::has_single_bit(static_cast<std::uint64_t>(side_))) {
-      fail(
-          ErrorCode::kUnsupported,
-          fmt::format("has tiles of {0} x {0} samples, no power of two, as where they have a rim of their neighbours'; "
-                      "gdal_translate makes a GeoTIFF of it",
-                      side_));
+      fail(ErrorCode::kUnsupported,
+           fmt::format("has tiles of {0} x {0} samples, not a power of two, as if they had a rim of their neighbours'; "
+                       "gdal_translate makes a GeoTIFF of it",
+                       side_));
     }
     info_.width = (box_.last_column - box_.first_column + 1) * side_;
     info_.height = (box_.last_row - box_.first_row + 1) * side_;
     info_.block_width = info_.block_height = side_;
-    packing_ = choose_packing(options.channel);
-    describe_packing(packing_, kChannels, 8, info_);
+    constexpr std::size_t kWithOpacity = 4;  // some tile may have it
+    describe_packing(packing_, kWithOpacity, 8, options, info_);
     place_web_tiles(zoom_, box_.first_column, box_.first_row, side_, info_);
-    gap_ = stored_sample(info_.sample_type,
-                         info_.void_values.empty() ? std::numeric_limits<double>::quiet_NaN() : info_.void_values[0]);
+    gap_ = stored_sample(info_.sample_type, info_.void_values.empty() ? std::numeric_limits<double>::quiet_NaN()
+                                                                      : info_.void_values.front());
     tile_bytes_ = static_cast<std::size_t>(side_ * side_) * size_bytes(info_.sample_type);
-    limit_buffers(kMostKeptBytes);
+    const auto across = static_cast<std::uint64_t>(info_.width / side_);
+    cache_.emplace(tile_bytes_, std::clamp<std::uint64_t>(options.buffer_bytes / tile_bytes_, 1, across));
     apply_open_options(info_, options);
   }
 
@@ -91,19 +78,20 @@ class TileSource final : public HeightSource {
     }
   }
 
-  void limit_buffers(std::uint64_t bytes) override {
-    cache_.emplace(tile_bytes_, static_cast<std::size_t>(buffer_bytes(bytes) / tile_bytes_));
-  }
-  [[nodiscard]] std::uint64_t buffer_bytes(std::uint64_t limit) const override {
-    const auto across = static_cast<std::uint64_t>(info_.width / side_);
-    return std::clamp<std::uint64_t>(std::min(limit, kMostKeptBytes) / tile_bytes_, 1, across) * tile_bytes_;
-  }
+  [[nodiscard]] std::uint64_t buffer_bytes() const override { return cache_->capacity() * tile_bytes_; }
 
  private:
+  struct Pixels {
+    std::int64_t side = 0;
+    std::size_t channels = 0;
+    std::vector<std::byte> bytes;
+  };
+
   [[noreturn]] void fail(ErrorCode code, const std::string& what) const { throw Error(code, info_.path + ": " + what); }
 
   void choose_zoom(const std::string& part) {
-    const auto [coarsest, finest] = store_->zooms();
+    const int coarsest = file_.coarsest();
+    const int finest = file_.finest();
     zoom_ = finest;
     if (!part.empty()) {
       const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), zoom_);
@@ -112,159 +100,98 @@ class TileSource final : public HeightSource {
       info_.warnings.push_back(
           fmt::format("has zoom levels {} to {}; {} is read, `part` takes another", coarsest, finest, finest));
     }
-    const auto found = zoom_ < coarsest || zoom_ > finest ? std::nullopt : store_->box(zoom_);
+    const auto found = zoom_ < coarsest || zoom_ > finest ? std::nullopt : file_.box(zoom_);
     if (!found) {
       fail(ErrorCode::kInvalidArgument,
-           fmt::format("has no zoom level \"{}\"; there are {} to {}", printable(part), coarsest, finest));
+           fmt::format("has no zoom level \"{}\"; there are {} to {}",
+                       part.empty() ? std::to_string(finest) : printable(part), coarsest, finest));
     }
     box_ = *found;
   }
 
-  [[nodiscard]] Packing choose_packing(const std::string& channel) {
-    if (!channel.empty()) {
-      if (const auto packing = packing_from_string(channel)) return *packing;
-      fail(ErrorCode::kInvalidArgument, "has no channels but packed elevations; `encoding` says how they are packed");
-    }
-    if (const auto packing = packing_from_string(store_->encoding())) return *packing;
-    // Tiles from all over: of the sea alone nothing shows.
-    constexpr std::int64_t kEachWay = 5;
-    PackingEvidence evidence(kChannels);
-    const auto add = [&](const TilePlace& place) {
-      std::vector<std::byte> stored;
-      if (!store_->read(place, stored)) return;
-      const Pixels pixels = decoded(place, stored);
-      const std::size_t row_bytes = static_cast<std::size_t>(pixels.side) * kChannels;
-      for (std::size_t at = 0; at < pixels.bytes.size(); at += row_bytes) {
-        evidence.add(std::span(pixels.bytes).subspan(at, row_bytes));
-      }
-    };
-    add(box_.any);
-    for (std::int64_t i = 0; i < kEachWay * kEachWay; ++i) {
-      const auto between = [](std::int64_t first, std::int64_t last, std::int64_t k) {
-        return first + (last - first + 1) * (2 * k + 1) / (2 * kEachWay);
-      };
-      add({zoom_, between(box_.first_column, box_.last_column, i % kEachWay),
-           between(box_.first_row, box_.last_row, i / kEachWay)});
-    }
-    const auto packing = evidence.packing();
-    if (!packing) {
-      fail(ErrorCode::kUnsupported,
-           "nothing shows whether its colours are packed elevations, and how; `encoding` terrarium, mapbox or "
-           "rgba-float "
-           "says it");
-    }
-    info_.warnings.push_back(
-        fmt::format("its colours are packed elevations, as their bytes show: decoded as with `encoding` {0}; give "
-                    "`encoding` {0} to "
-                    "say so",
-                    to_string(*packing)));
-    return *packing;
+  [[nodiscard]] Packing choose_packing(const OpenOptions& options) const {
+    if (!options.channel.empty())
+      fail(ErrorCode::kInvalidArgument, "has no channels but packed elevations; `encoding` states how they are packed");
+    if (const auto packing = stated_packing(options)) return *packing;
+    if (const auto packing = packing_from_string(file_.encoding())) return *packing;
+    fail(ErrorCode::kUnsupported,
+         fmt::format("does not state how its colours hold elevations; `encoding` {} does", kEncodings));
   }
 
-  static std::string name_of(const TilePlace& place) {
-    return fmt::format("tile {}/{}/{}", place.zoom, place.column, place.row);
-  }
-
-  [[nodiscard]] Pixels pixels_of(const TilePlace& place) const {
+  [[nodiscard]] Pixels pixels_of(const TilePlace& place) {
     std::vector<std::byte> stored;
-    if (!store_->read(place, stored)) fail(ErrorCode::kCorrupt, name_of(place) + " is listed, but not there");
-    return decoded(place, stored);
+    if (file_.read(place, stored)) return decoded(place, stored);
+    fail(ErrorCode::kCorrupt,
+         fmt::format("tile {}/{}/{} is listed, but not there", place.zoom, place.column, place.row));
   }
 
   [[nodiscard]] Pixels decoded(const TilePlace& place, const std::vector<std::byte>& stored) const {
-    const std::string where = name_of(place);
-    PngDecoder png;
-    WebpDecoder webp;
-    PictureDecoder* const decoder = looks_like_png(stored)    ? static_cast<PictureDecoder*>(&png)
-                                    : looks_like_webp(stored) ? static_cast<PictureDecoder*>(&webp)
-                                                              : nullptr;
-    if (decoder == nullptr) {
-      constexpr std::array<std::byte, 2> kJpeg = {std::byte{0xFF}, std::byte{0xD8}};
-      constexpr std::array<std::byte, 2> kGzip = {std::byte{0x1F}, std::byte{0x8B}};
-      const auto begins = [&](const auto& head) {
-        return stored.size() >= head.size() && std::equal(head.begin(), head.end(), stored.begin());
-      };
-      const char* const what = begins(kJpeg)   ? "a JPEG picture, which does not keep the bytes of elevations"
-                               : begins(kGzip) ? "no picture, but packed outlines, as of a map of vectors"
-                                               : "no PNG or WebP picture";
-      fail(ErrorCode::kUnsupported, fmt::format("{} is {}", where, what));
+    const auto refuse = [&](ErrorCode code, const std::string& what) {
+      fail(code, fmt::format("tile {}/{}/{} {}", place.zoom, place.column, place.row, what));
+    };
+    std::unique_ptr<PictureDecoder> decoder;
+    if (kPngFormat.recognises(stored)) decoder = std::make_unique<PngDecoder>();
+    if (looks_like_webp(stored)) decoder = std::make_unique<WebpDecoder>();
+    if (!decoder) {
+      const bool is_jpeg = text_of(stored).starts_with("\xFF\xD8");
+      const bool is_gzip = text_of(stored).starts_with("\x1F\x8B");
+      refuse(ErrorCode::kUnsupported, is_jpeg   ? "is a JPEG picture, which does not keep the bytes of elevations"
+                                      : is_gzip ? "is no picture, but packed outlines, as of a map of vectors"
+                                                : "is no PNG or WebP picture");
     }
+    const auto check = [&](bool done) {
+      if (!done) refuse(ErrorCode::kCorrupt, fmt::format("is damaged: {}", decoder->message()));
+    };
     PngHeader header;
-    const auto check = [&](bool holds) {
-      if (!holds) fail(ErrorCode::kCorrupt, fmt::format("{}: {}", where, decoder->message()));
-    };
     check(decoder->open(stored, header));
-    if (header.width != header.height || header.width > kMostSide || (side_ != 0 && header.width != side_)) {
-      fail(ErrorCode::kUnsupported,
-           fmt::format("{} has {} x {} samples, must have {}", where, header.width, header.height,
-                       side_ == 0 ? "as many rows as columns" : fmt::format("{} each way", side_)));
+    const bool is_square = header.width == header.height && header.width <= kMostSide;
+    if (!is_square || (side_ > 0 && header.width != side_)) {
+      refuse(ErrorCode::kUnsupported, fmt::format("has {} x {} samples, must have {} each way", header.width,
+                                                  header.height, side_ > 0 ? side_ : kMostSide));
     }
-    if (header.is_lossy) {
-      fail(ErrorCode::kUnsupported, where + " is lossy WebP, which does not keep the bytes of elevations");
-    }
+    if (header.is_lossy) refuse(ErrorCode::kUnsupported, "is lossy WebP, which does not keep the bytes of elevations");
     check(decoder->start(header, PictureDecoder::For::kPicture));
-    if (header.bit_depth != 8) {
-      fail(ErrorCode::kUnsupported, fmt::format("{} has channels of {} bits, must have 8", where, header.bit_depth));
-    }
-    std::vector<std::byte> picture(header.row_bytes * header.height);
-    check(decoder->read_picture(picture, header) && decoder->finish());
-    return {header.width, with_opacity(std::move(picture), header.channels.size())};
+    if (header.bit_depth != 8)
+      refuse(ErrorCode::kUnsupported, fmt::format("has channels of {} bits, must have 8", header.bit_depth));
+    Pixels pixels{header.width, header.channels.size(), std::vector<std::byte>(header.row_bytes * header.height)};
+    check(decoder->read_picture(pixels.bytes, header) && decoder->finish());
+    return pixels;
   }
 
-  /// Pixels of 1 to 4 channels as those of four: grey is red, green and blue alike.
-  static std::vector<std::byte> with_opacity(std::vector<std::byte> picture, std::size_t channels) {
-    if (channels == kChannels) return picture;
-    std::vector<std::byte> all;
-    all.reserve(picture.size() / channels * kChannels);
-    for (std::size_t at = 0; at + channels <= picture.size(); at += channels) {
-      const bool is_grey = channels < 3;
-      for (std::size_t c = 0; c < 3; ++c) all.push_back(picture[at + (is_grey ? 0 : c)]);
-      all.push_back(channels == 2 ? picture[at + 1] : std::byte{0xFF});
-    }
-    return all;
-  }
-
-  /// Tiles of a row, decoded side by side where they are not held; as many as the cache takes.
+  /// Tiles of a row, decoded side by side if they are not held; as many as the cache takes.
   [[nodiscard]] std::vector<const std::byte*> tiles_of(std::int64_t row, std::int64_t first, std::int64_t end) {
-    struct Wanted {
-      TilePlace place;
-      std::byte* out;
-      std::exception_ptr failure;
+    const auto index = [&](std::int64_t column) {
+      return static_cast<std::uint64_t>(row * (info_.width / side_) + column);
     };
-    const std::int64_t across = info_.width / side_;
     std::vector<const std::byte*> tiles;
-    std::vector<Wanted> wanted;
+    std::vector<std::pair<std::int64_t, std::byte*>> wanted;
     // Those that are held first: claiming makes room of what was not asked for lately.
-    for (std::int64_t column = first; column < end; ++column)
-      tiles.push_back(cache_->find(static_cast<std::uint64_t>(row * across + column)));
+    for (std::int64_t column = first; column < end; ++column) tiles.push_back(cache_->find(index(column)));
     for (std::int64_t column = first; column < end; ++column) {
       const std::byte*& tile = tiles[static_cast<std::size_t>(column - first)];
       if (tile != nullptr) continue;
-      std::byte* const room = cache_->claim(static_cast<std::uint64_t>(row * across + column));
-      wanted.push_back({{zoom_, box_.first_column + column, box_.first_row + row}, room, nullptr});
-      tile = room;
+      wanted.emplace_back(column, cache_->claim(index(column)));
+      tile = wanted.back().second;
     }
-    oneapi::tbb::this_task_arena::isolate([&] {
-      oneapi::tbb::parallel_for(std::size_t{0}, wanted.size(), [&](std::size_t i) {
-        try {
-          decode(wanted[i].place, {wanted[i].out, tile_bytes_});
-        } catch (...) {
-          wanted[i].failure = std::current_exception();
-        }
+    try {
+      oneapi::tbb::this_task_arena::isolate([&] {
+        oneapi::tbb::parallel_for(std::size_t{0}, wanted.size(), [&](std::size_t i) {
+          const auto [column, room] = wanted[i];
+          decode({zoom_, box_.first_column + column, box_.first_row + row}, {room, tile_bytes_});
+        });
       });
-    });
-    for (const Wanted& each : wanted) {
-      if (!each.failure) continue;
+    } catch (...) {
       cache_->clear();
-      std::rethrow_exception(each.failure);
+      throw;
     }
     return tiles;
   }
 
-  void decode(const TilePlace& place, std::span<std::byte> samples) const {
+  void decode(const TilePlace& place, std::span<std::byte> samples) {
     std::vector<std::byte> stored;
-    if (store_->read(place, stored)) {
-      return unpack_elevations(packing_, kChannels, decoded(place, stored).bytes, samples);
+    if (file_.read(place, stored)) {
+      const Pixels pixels = decoded(place, stored);
+      return unpack_elevations(packing_, pixels.channels, pixels.bytes, samples);
     }
     for (std::size_t at = 0; at < samples.size(); at += gap_.size())
       std::memcpy(samples.data() + at, gap_.data(), gap_.size());
@@ -285,10 +212,10 @@ class TileSource final : public HeightSource {
     }
   }
 
-  std::unique_ptr<TileStore> store_;
+  PmtilesFile file_;
   SourceInfo info_;
   int zoom_ = 0;
-  TileStore::Box box_;
+  TileBox box_;
   std::int64_t side_ = 0;  ///< samples of a tile each way
   Packing packing_ = Packing::kTerrarium;
   std::vector<std::byte> gap_;  ///< a sample where there is no tile
@@ -296,16 +223,18 @@ class TileSource final : public HeightSource {
   std::optional<BlockCache> cache_;
 };
 
+std::unique_ptr<HeightSource> open_pmtiles(const std::string& path, const OpenOptions& options) {
+  return std::make_unique<TileSource>(path, options);
+}
+
 }  // namespace
 
-std::string encoding_in_json(const std::string& text) {
-  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
-  if (!json.is_object() || !json.contains("encoding") || !json["encoding"].is_string()) return {};
-  return json["encoding"].get<std::string>();
-}
-
-std::unique_ptr<HeightSource> open_pmtiles(const std::string& path, const OpenOptions& options) {
-  return std::make_unique<TileSource>(path, "PMTiles", open_pmtiles_store(path), options);
-}
+const Format kPmtilesFormat = {.name = "PMTiles",
+                               .extensions = {".pmtiles"},
+                               .note = "takes `encoding` and `part`",
+                               .open = open_pmtiles,
+                               .recognises = looks_like_pmtiles,
+                               .takes_part = true,
+                               .takes_encoding = true};
 
 }  // namespace isohf

@@ -4,7 +4,7 @@
 
 #include "formats/write/encoders.h"
 #include "formats/write/raster_sink.h"
-#include "isohf/projection/source_system.h"
+#include "isohf/projection/crs/source_system.h"
 
 namespace isohf {
 

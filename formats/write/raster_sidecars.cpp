@@ -1,26 +1,34 @@
-#include "formats/georeference/gdal_unit.h"
-#include "formats/write/encoders.h"
-#include "isohf/projection/crs.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <pugixml.hpp>
+#include <sstream>
 
-#include "formats/georeference/files_beside.h"
-#include "formats/io/text.h"
+#include "formats/georeference/gdal_unit.h"
+#include "formats/georeference/sidecars.h"
+#include "formats/write/encoders.h"
 #include "isohf/base/output_file.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
+#include "isohf/projection/crs/crs.h"
 
 namespace isohf {
 namespace {
 
 std::string extension_of(const std::string& path) {
   return lower_case(std::filesystem::path(path).extension().string());
+}
+
+std::string beside(const std::string& path, const char* extension) {
+  return std::filesystem::path(path).replace_extension(extension).string();
+}
+
+bool is_raw(const std::string& extension) {
+  return extension == ".r16" || extension == ".r32" || extension == ".raw";
 }
 
 /// Size, place and void value in the words that GridFloat and ASCII grids share. Cells are areas: the corner of the
@@ -50,62 +58,45 @@ std::string grid_float_header(const RasterSpec& spec) {
       place.spacing_y, grid_void(spec));
 }
 
-/// ESRI's WKT of the reference system, without PROJ for the commonest: WGS 84 in degrees and its UTM zones. Empty where
-/// nothing names the system.
-std::string esri_text(const ReferenceSystem& system) {
-  const std::string wgs84 = R"(GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],)"
-                            R"(PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]])";
-  const int epsg = system.vertical_epsg ? 0 : system.epsg.value_or(0);
-  if (epsg == 4326) return wgs84;
-  const bool north = epsg > 32600 && epsg <= 32660;
-  const bool south = epsg > 32700 && epsg <= 32760;
-  if (!north && !south) return wkt_of(system, WktDialect::kEsri);
-  const int zone = epsg % 100;
-  return fmt::format(
-      R"(PROJCS["WGS_1984_UTM_Zone_{}{}",{},PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],)"
-      R"(PARAMETER["False_Northing",{}],PARAMETER["Central_Meridian",{}],PARAMETER["Scale_Factor",0.9996],)"
-      R"(PARAMETER["Latitude_Of_Origin",0.0],UNIT["Meter",1.0]])",
-      zone, north ? 'N' : 'S', wgs84, north ? "0.0" : "10000000.0", 6 * zone - 183);
-}
-
+/// ESRI's WKT of the reference system; empty if nothing names it.
 std::string prj_text(const RasterSpec& spec) {
-  return spec.georeference ? esri_text(spec.georeference->system) : std::string();
+  return spec.georeference ? wkt_of(spec.georeference->system, WktDialect::kEsri) : std::string();
 }
 
-std::string xml_text(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    escaped += c == '<' ? "&lt;" : c == '&' ? "&amp;" : c == '>' ? "&gt;" : std::string(1, c);
-  }
-  return escaped;
-}
-
-/// GDAL's Persistent Auxiliary Metadata: the place, and of elevations what the numbers mean.
+/// GDAL's Persistent Auxiliary Metadata: the place, and what the numbers of elevations mean.
 std::string auxiliary_text(const RasterSpec& spec) {
   const Georeference& place = *spec.georeference;
-  std::string text = "<PAMDataset>\n";
-  std::string system = wkt_of(place.system, WktDialect::kGdal);
-  if (system.empty()) system = prj_text(spec);  // without PROJ
-  if (!system.empty()) text += fmt::format("  <SRS>{}</SRS>\n", xml_text(system));
-  text += fmt::format("  <GeoTransform>{}, {}, 0, {}, 0, {}</GeoTransform>\n", place.origin_x - place.spacing_x / 2.0,
-                      place.spacing_x, place.origin_y + place.spacing_y / 2.0, -place.spacing_y);
+  pugi::xml_document document;
+  pugi::xml_node root = document.append_child("PAMDataset");
+  const auto add = [](pugi::xml_node parent, const char* name, const std::string& text) {
+    pugi::xml_node node = parent.append_child(name);
+    node.text().set(text.c_str());
+    return node;
+  };
+  const std::string system = wkt_of(place.system, WktDialect::kGdal);
+  if (!system.empty()) add(root, "SRS", system);
+  add(root, "GeoTransform",
+      fmt::format("{}, {}, 0, {}, 0, {}", place.origin_x - place.spacing_x / 2.0, place.spacing_x,
+                  place.origin_y + place.spacing_y / 2.0, -place.spacing_y));
   if (place.registration != Registration::kUnknown) {
-    text += fmt::format("  <Metadata>\n    <MDI key=\"AREA_OR_POINT\">{}</MDI>\n  </Metadata>\n",
-                        place.registration == Registration::kPoint ? "Point" : "Area");
+    const char* const kind = place.registration == Registration::kPoint ? "Point" : "Area";
+    add(root.append_child("Metadata"), "MDI", kind).append_attribute("key") = "AREA_OR_POINT";
   }
   if (spec.channels == 1) {
-    text += "  <PAMRasterBand band=\"1\">\n";
-    if (spec.void_value) text += fmt::format("    <NoDataValue>{}</NoDataValue>\n", *spec.void_value);
+    pugi::xml_node band = root.append_child("PAMRasterBand");
+    band.append_attribute("band") = 1;
+    if (spec.void_value) add(band, "NoDataValue", fmt::format("{}", *spec.void_value));
     if (!spec.vertical_unit.empty()) {
-      text += fmt::format("    <UnitType>{}</UnitType>\n",
-                          xml_text(gdal_unit(spec.vertical_unit, place.system.vertical_epsg.has_value())));
+      add(band, "UnitType", gdal_unit(spec.vertical_unit, place.system.vertical_epsg.has_value()));
     }
     if (spec.z_scale != 1.0 || spec.z_offset != 0.0) {
-      text += fmt::format("    <Offset>{}</Offset>\n    <Scale>{}</Scale>\n", spec.z_offset, spec.z_scale);
+      add(band, "Offset", fmt::format("{}", spec.z_offset));
+      add(band, "Scale", fmt::format("{}", spec.z_scale));
     }
-    text += "  </PAMRasterBand>\n";
   }
-  return text + "</PAMDataset>\n";
+  std::ostringstream text;
+  document.save(text, "  ", pugi::format_indent | pugi::format_no_declaration);
+  return text.str();
 }
 
 /// The six numbers of a world file: the middle of the first sample, whatever samples stand for.
@@ -148,18 +139,32 @@ std::string json_text(const std::string& extension, const RasterSpec& spec) {
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
+/// Whether a file, if it exists, is what its extension says: not a Radiance picture or ENVI header called .hdr.
+bool is_sidecar(const std::string& path) {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 16U;
+  const std::vector<std::byte> bytes = head_of_file(path, kMostBytes);
+  const std::string text = lower_case(text_of(bytes));
+  const std::string extension = extension_of(path);
+  if (text.empty()) return true;
+  if (extension == ".json") {
+    const auto json = nlohmann::json::parse(text, nullptr, false);
+    return json.is_object() && json.contains("width") && json.contains("sample_type");
+  }
+  if (extension == ".xml") return text.starts_with("<pamdataset");
+  if (extension == ".wld" || (extension.size() > 2 && extension.back() == 'w')) {
+    return text.find_first_not_of("0123456789+-.e \t\r\n") == text.npos;
+  }
+  if (extension == ".hdr") return text.find("ncols") != text.npos && text.find("nrows") != text.npos;
+  const std::size_t end = text.find_first_not_of("abcdefghijklmnopqrstuvwxyz_");
+  return end > 0 && end != text.npos && (text[end] == '[' || text.starts_with("projection"));
+}
+
 }  // namespace
 
 double grid_void(const RasterSpec& spec) {
   if (spec.void_value && !std::isnan(*spec.void_value)) return *spec.void_value;
-  switch (spec.sample_type) {
-    case SampleType::kFloat16:
-    case SampleType::kFloat32:
-    case SampleType::kFloat64:
-      return static_cast<double>(std::numeric_limits<float>::lowest());
-    default:
-      return -2147483648.0;  // integers without a void value have none; the word is required all the same
-  }
+  // Integers without a nodata value have none; the word is required all the same.
+  return is_floating(spec.sample_type) ? static_cast<double>(std::numeric_limits<float>::lowest()) : -2147483648.0;
 }
 
 std::string ascii_grid_header(const RasterSpec& spec) {
@@ -171,85 +176,57 @@ std::string ascii_grid_header(const RasterSpec& spec) {
 
 std::vector<std::string> sidecar_paths(const std::string& path) {
   const std::string extension = extension_of(path);
-  const auto beside = [&](const char* other) { return std::filesystem::path(path).replace_extension(other).string(); };
-  if (extension == ".flt") return {beside(".hdr"), beside(".prj")};
-  if (extension == ".asc") return {beside(".prj")};
+  if (extension == ".flt") return {beside(path, ".hdr"), beside(path, ".prj")};
+  if (extension == ".asc") return {beside(path, ".prj")};
   if (extension == ".exr") return {world_file_name(path), path + ".aux.xml"};
   if (extension == ".png") return {path + ".json", world_file_name(path), path + ".aux.xml"};
-  const bool described = extension == ".r16" || extension == ".r32" || extension == ".raw";
-  return described ? std::vector<std::string>{path + ".json"} : std::vector<std::string>{};
-}
-
-std::vector<std::string> stale_sidecars(const std::string& path, const RasterSpec* spec) {
-  std::vector<std::string> stale = sidecar_paths(path);
-  stale.push_back(path + ".aux.xml");
-  const auto beside = [&](const char* other) { return std::filesystem::path(path).replace_extension(other).string(); };
-  const bool has_place = spec != nullptr && spec->georeference.has_value();
-  if (!has_place || !spec->georeference->has_origin) {
-    stale.push_back(world_file_name(path));
-    stale.push_back(beside(".wld"));
-  }
-  if (!has_place || system_text(spec->georeference->system).empty()) stale.push_back(beside(".prj"));
-  std::sort(stale.begin(), stale.end());
-  stale.erase(std::unique(stale.begin(), stale.end()), stale.end());
-  const std::vector<Sidecar> kept = spec != nullptr ? sidecars_of(path, *spec) : std::vector<Sidecar>{};
-  std::erase_if(stale, [&](const std::string& file) {
-    std::error_code ignored;
-    if (std::ranges::any_of(kept, [&](const Sidecar& sidecar) { return sidecar.path == file; })) return true;
-    if (!std::filesystem::is_regular_file(file, ignored)) return true;
-    try {
-      check_sidecar_target(file);
-    } catch (const Error&) {
-      return true;
-    }
-    return false;
-  });
-  return stale;
-}
-
-void check_sidecar_target(const std::string& path) {
-  constexpr std::size_t kMostBytes = std::size_t{1} << 16U;
-  const std::vector<std::byte> bytes = head_of_file(path, kMostBytes);
-  if (bytes.empty()) return;
-  const std::string text = lower_case({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-  const std::string extension = extension_of(path);
-  bool is_kind = false;
-  if (extension == ".json") {
-    const auto json = nlohmann::json::parse(text, nullptr, false);
-    is_kind = json.is_object() && json.contains("width") && json.contains("sample_type");
-  } else if (extension == ".xml") {
-    is_kind = text.starts_with("<pamdataset");
-  } else if (extension == ".wld" || (extension.size() > 2 && extension.back() == 'w')) {
-    is_kind = text.find_first_not_of("0123456789+-.e \t\r\n") == std::string::npos;
-  } else if (extension == ".hdr") {
-    is_kind = text.find("ncols") != std::string::npos && text.find("nrows") != std::string::npos;
-  } else {
-    const std::size_t end = text.find_first_not_of("abcdefghijklmnopqrstuvwxyz_");
-    is_kind = end > 0 && end != std::string::npos && (text[end] == '[' || text.starts_with("projection"));
-  }
-  if (is_kind) return;
-  throw Error(
-      ErrorCode::kInvalidArgument,
-      fmt::format("exists and is no {} of a raster, which alone is replaced; remove it first, or choose another "
-                  "name for the raster",
-                  extension));
+  return is_raw(extension) ? std::vector<std::string>{path + ".json"} : std::vector<std::string>{};
 }
 
 std::vector<Sidecar> sidecars_of(const std::string& path, const RasterSpec& spec) {
   const std::string extension = extension_of(path);
-  const auto beside = [&](const char* other) { return std::filesystem::path(path).replace_extension(other).string(); };
   std::vector<Sidecar> list;
-  if (extension == ".flt") list.push_back({beside(".hdr"), grid_float_header(spec)});
+  if (extension == ".flt") list.push_back({beside(path, ".hdr"), grid_float_header(spec)});
   if (extension == ".flt" || extension == ".asc") {
-    if (std::string text = prj_text(spec); !text.empty()) list.push_back({beside(".prj"), text + "\n"});
+    if (std::string text = prj_text(spec); !text.empty()) list.push_back({beside(path, ".prj"), text + "\n"});
   }
-  const bool raw = extension == ".r16" || extension == ".r32" || extension == ".raw";
-  if (raw || (extension == ".png" && spec.describe)) list.push_back({path + ".json", json_text(extension, spec)});
+  if (is_raw(extension) || (extension == ".png" && spec.describe)) {
+    list.push_back({path + ".json", json_text(extension, spec)});
+  }
   if ((extension == ".exr" || extension == ".png") && spec.georeference && spec.georeference->has_origin) {
     list.push_back({world_file_name(path), world_text(*spec.georeference)});
     list.push_back({path + ".aux.xml", auxiliary_text(spec)});
   }
   return list;
+}
+
+std::vector<std::string> stale_sidecars(const std::string& path, const RasterSpec* spec) {
+  std::vector<std::string> stale = sidecar_paths(path);
+  stale.push_back(path + ".aux.xml");
+  const bool has_place = spec != nullptr && spec->georeference.has_value();
+  if (!has_place || !spec->georeference->has_origin) {
+    stale.push_back(world_file_name(path));
+    stale.push_back(beside(path, ".wld"));
+  }
+  if (!has_place || system_text(spec->georeference->system).empty()) stale.push_back(beside(path, ".prj"));
+  std::ranges::sort(stale);
+  stale.erase(std::ranges::unique(stale).begin(), stale.end());
+  const std::vector<Sidecar> kept = spec != nullptr ? sidecars_of(path, *spec) : std::vector<Sidecar>{};
+  std::erase_if(stale, [&](const std::string& file) {
+    std::error_code ignored;
+    return std::ranges::find(kept, file, &Sidecar::path) != kept.end() ||
+           !std::filesystem::is_regular_file(file, ignored) || !is_sidecar(file);
+  });
+  return stale;
+}
+
+void check_sidecar_target(const std::string& path) {
+  if (is_sidecar(path)) return;
+  throw Error(
+      ErrorCode::kInvalidArgument,
+      fmt::format("exists and is no {} of a raster, which alone is replaced; remove it first, or choose another "
+                  "name for the raster",
+                  extension_of(path)));
 }
 
 }  // namespace isohf

@@ -8,11 +8,11 @@
 #include <limits>
 #include <span>
 
-#include "formats/io/text.h"
 #include "formats/readers.h"
 #include "formats/write/encoders.h"
 #include "isohf/base/file.h"
 #include "isohf/base/output_file.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -21,16 +21,16 @@ namespace {
 struct Writer {
   Format format;
   std::unique_ptr<RasterEncoder> (*encode)(OutputFile& out, const RasterSpec& spec);
-  bool has_signature;                             ///< by which its files are known; others begin in any way
   double (*least_bytes)(const RasterSpec& spec);  ///< of a sample in the file
   std::vector<SampleType> types;                  ///< that it holds, the usual one first; empty: all
-  RasterTraits traits;
+  RasterTraits traits = {};
+  bool has_signature = false;  ///< by which its files are known; others begin in any way
 };
 
 double plain_bytes(const RasterSpec& spec) {
   return static_cast<double>(size_bytes(spec.sample_type));
 }
-/// A digit and what parts it from the next.
+/// A digit and a blank.
 double text_bytes(const RasterSpec& /*spec*/) {
   return 2.0;
 }
@@ -44,73 +44,62 @@ double packed_bytes(const RasterSpec& spec) {
 
 const std::vector<Writer>& writers() {
   using enum SampleType;
+  static const RasterTraits kStatesScale = {.states_scale = true};
+  static const RasterTraits kBare = {.states_scale = true, .is_bare = true};
+  static const RasterTraits kGrid = {.has_place = true};
   static const std::vector<Writer> table = {
-      {{"GeoTIFF", {".tif", ".tiff"}, tiff_library, "samples of any type"},
+      {{"GeoTIFF", {".tif", ".tiff"}, kTiffFormat.library, "samples of any type"},
        encode_tiff,
-       true,
        packed_bytes,
        {},
-       {.states_scale = true}},
-      {{"OpenEXR", {".exr"}, exr_library, "float16, float32, uint32"},
+       kStatesScale,
+       true},
+      {{"OpenEXR", {".exr"}, kExrFormat.library, "float16, float32, uint32"},
        encode_exr,
-       true,
        packed_bytes,
        {kFloat32, kFloat16, kUint32},
-       {.voids_are_nan = true}},
-      {{"PNG", {".png"}, png_library, "uint8, uint16"},
+       {.voids_are_nan = true},
+       true},
+      {{"PNG", {".png"}, kPngFormat.library, "uint8, uint16"},
        encode_png,
-       true,
        deflated_bytes,
        {kUint16, kUint8},
-       {.states_scale = true}},
+       kBare,
+       true},
       {{"SRTM HGT", {".hgt"}, nullptr, "int16; 1201x1201, 3601x3601 or 1801x3601"},
        encode_hgt,
-       false,
        plain_bytes,
        {kInt16},
        {.is_srtm = true}},
       {{"ESRI ASCII grid", {".asc"}, nullptr, "samples of any type"},
        encode_asc,
-       true,
        text_bytes,
        {},
-       {.has_place = true, .is_text = true}},
-      {{"GridFloat", {".flt"}, nullptr, "float32; with .hdr"},
-       encode_flt,
-       false,
-       plain_bytes,
-       {kFloat32},
-       {.has_place = true}},
-      {{"raw 16 bit", {".r16", ".raw"}, nullptr, "uint16; with .json"},
-       encode_r16,
-       false,
-       plain_bytes,
-       {kUint16},
-       {.states_scale = true, .is_bare = true}},
-      {{"raw 32 bit", {".r32"}, nullptr, "float32; with .json"},
-       encode_r32,
-       false,
-       plain_bytes,
-       {kFloat32},
-       {.states_scale = true, .is_bare = true}},
-      {{"NumPy", {".npy"}, nullptr, "samples of any type"}, encode_npy, true, plain_bytes, {}, {}},
+       {.has_place = true, .is_text = true},
+       true},
+      {{"GridFloat", {".flt"}, nullptr, "float32; with .hdr"}, encode_flt, plain_bytes, {kFloat32}, kGrid},
+      {{"raw 16 bit", {".r16", ".raw"}, nullptr, "uint16; with .json"}, encode_r16, plain_bytes, {kUint16}, kBare},
+      {{"raw 32 bit", {".r32"}, nullptr, "float32; with .json"}, encode_r32, plain_bytes, {kFloat32}, kBare},
+      {{"NumPy", {".npy"}, nullptr, "samples of any type"}, encode_npy, plain_bytes, {}, {}, true},
   };
   return table;
 }
 
-std::string lower_extension(const std::string& path) {
-  const std::size_t dot = path.rfind('.');
-  if (dot == std::string::npos || path.find('/', dot) != std::string::npos) return {};
-  return lower_case(path.substr(dot));
+/// What `action` returns; its errors name the path.
+template <typename Action>
+auto naming(const std::string& path, const Action& action) {
+  try {
+    return action();
+  } catch (const Error& error) {
+    throw error.within(path);
+  }
 }
 
 const Writer& writer_for(const std::string& path) {
   if (path == "-") static_cast<void>(output_place(path, true));  // says why before the extension is looked at
-  const std::string extension = lower_extension(path);
+  const std::string extension = lower_case(std::filesystem::path(path).extension().string());
   for (const Writer& writer : writers()) {
-    for (const char* known : writer.format.extensions) {
-      if (extension == known) return writer;
-    }
+    if (std::ranges::count(writer.format.extensions, extension) > 0) return writer;
   }
   throw Error(ErrorCode::kInvalidArgument, fmt::format("no writer for the extension \"{}\"; there are {}", extension,
                                                        fmt::join(writable_extensions(), " ")));
@@ -129,7 +118,7 @@ void check(const RasterSpec& spec) {
 
 /// What a file is that is to be replaced; empty where it is of the writer's kind, or empty.
 std::string other_kind(const std::string& path, const Writer& writer) {
-  constexpr std::size_t kHeadBytes = 256;
+  constexpr std::size_t kHeadBytes = 512;
   const std::vector<std::byte> head = head_of_file(path, kHeadBytes);
   if (head.empty()) return {};
   if (text_of(head).starts_with("PK\x03\x04")) return "a ZIP archive, as .isohf files are";
@@ -151,6 +140,11 @@ void check_target(const std::string& path, const Writer& writer, bool overwrite)
                           kind, writer.format.name));
 }
 
+void check_room(const std::string& path, const Writer& writer, const RasterSpec& spec, std::int64_t count) {
+  const double samples = static_cast<double>(spec.width) * static_cast<double>(spec.height) * spec.channels;
+  require_room(path, static_cast<double>(count) * samples * writer.least_bytes(spec));
+}
+
 /// Whether the file is there already, as it would be written: rasters of one name may share a .prj.
 bool holds(const Sidecar& sidecar) {
   const std::vector<std::byte> found = head_of_file(sidecar.path, sidecar.text.size() + 1);
@@ -160,15 +154,13 @@ bool holds(const Sidecar& sidecar) {
 std::vector<std::unique_ptr<OutputFile>> begin_sidecars(const std::string& path, const RasterSpec& spec) {
   std::vector<std::unique_ptr<OutputFile>> files;
   for (const Sidecar& sidecar : sidecars_of(path, spec)) {
-    try {
-      if (holds(sidecar)) continue;
+    naming(sidecar.path, [&] {
+      if (holds(sidecar)) return;
       check_sidecar_target(sidecar.path);
       files.push_back(std::make_unique<OutputFile>(sidecar.path, OutputFile::Options{spec.overwrite}));
       files.back()->append(sidecar.text);
       files.back()->flush();
-    } catch (const Error& error) {
-      throw error.within(sidecar.path);
-    }
+    });
   }
   return files;
 }
@@ -234,11 +226,7 @@ void RasterSink::write_rows(std::span<const std::byte> rows) {
                             rows_written_, spec_.height, one_row));
   }
   if (count == 0) return;
-  try {
-    encoder_->write(rows, count);
-  } catch (const Error& error) {
-    throw error.within(path_);
-  }
+  naming(path_, [&] { encoder_->write(rows, count); });
   rows_written_ += count;
 }
 
@@ -248,14 +236,12 @@ void RasterSink::close() {
                 fmt::format("{}: finished after {} of {} rows", path_, rows_written_, spec_.height));
   }
   if (!encoder_) return;
-  try {
+  naming(path_, [&] {
     encoder_->close();
     encoder_.reset();
     file_->sync();
     for (const auto& sidecar : sidecars_) sidecar->sync();
-  } catch (const Error& error) {
-    throw error.within(path_);
-  }
+  });
 }
 
 void RasterSink::complete() {
@@ -302,46 +288,33 @@ void remove_raster(const std::string& path) {
 }
 
 std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterSpec& spec) {
-  try {
+  return naming(path, [&] {
     const Writer& writer = writer_for(path);
     check(spec);
     check_target(path, writer, spec.overwrite);
-    check_raster_room(path, spec);
+    check_room(path, writer, spec, 1);
     auto file = std::make_unique<OutputFile>(path, OutputFile::Options{spec.overwrite});
     auto sidecars = begin_sidecars(path, spec);
     auto encoder = writer.encode(*file, spec);
     return std::make_unique<RasterSink>(path, spec, std::move(file), std::move(sidecars), std::move(encoder));
-  } catch (const Error& error) {
-    throw error.within(path);
-  }
+  });
 }
 
-RasterTraits raster_traits(const std::string& path) try { return writer_for(path).traits; } catch (const Error& error) {
-  throw error.within(path);
+RasterTraits raster_traits(const std::string& path) {
+  return naming(path, [&] { return writer_for(path).traits; });
 }
 
-SampleType held_type(const std::string& path, SampleType wanted) try {
-  const std::vector<SampleType>& types = writer_for(path).types;
+SampleType held_type(const std::string& path, SampleType wanted) {
+  const std::vector<SampleType> types = naming(path, [&] { return writer_for(path).types; });
   return types.empty() || std::ranges::count(types, wanted) > 0 ? wanted : types.front();
-} catch (const Error& error) {
-  throw error.within(path);
 }
 
 void check_raster_target(const std::string& path, bool overwrite) {
-  try {
-    check_target(path, writer_for(path), overwrite);
-  } catch (const Error& error) {
-    throw error.within(path);
-  }
+  naming(path, [&] { check_target(path, writer_for(path), overwrite); });
 }
 
 void check_raster_room(const std::string& path, const RasterSpec& spec, std::int64_t count) {
-  try {
-    const double samples = static_cast<double>(spec.width) * static_cast<double>(spec.height) * spec.channels;
-    require_room(path, static_cast<double>(count) * samples * writer_for(path).least_bytes(spec));
-  } catch (const Error& error) {
-    throw error.within(path);
-  }
+  naming(path, [&] { check_room(path, writer_for(path), spec, count); });
 }
 
 const std::vector<std::string>& writable_extensions() {

@@ -19,7 +19,7 @@ class RasterEncoder;
 /// A raster file that is written from its first row to its last.
 ///
 /// Everything goes to NAME.part (output_file.h), which finish() flushes to the disk and renames; a sink that is
-/// destroyed before leaves nothing behind. The files beside it (raster_sidecars.h) get their names first, when all are
+/// destroyed before leaves nothing behind. Its sidecar files get their names first, when all are
 /// on the disk; samples and a description that do not belong together never stand beside each other. One thread calls.
 /// Memory: a few megabytes, a few rows where these are longer, and 256 rows for TIFF, of 64 MiB at most. TIFF strips
 /// are compressed on the caller's oneTBB arena; the bytes do not depend on the number of threads.
@@ -56,16 +56,7 @@ class RasterSink {
   std::int64_t rows_written_ = 0;
 };
 
-/// Begins a raster whose format follows from the extension of `path`, in any case:
-///   .tif .tiff  TIFF 6.0: tiles of 256 x 256, or strips; deflate with predictor, BigTIFF above 4 GB, GeoTIFF keys,
-///               GDAL_NODATA; any type
-///   .exr        OpenEXR scan lines, ZIP; float16, float32, uint32
-///   .png        uint8, uint16; a gray void value becomes the transparent one
-///   .hgt        one int16 channel of 1201 x 1201, 3601 x 3601 or 1801 x 3601 samples; void is -32768
-///   .asc        one channel of any type, in decimal; NaN becomes the lowest float
-///   .flt        one float32 channel, with its .hdr; NaN becomes the lowest float
-///   .r16 .raw   one uint16 channel, little-endian, nothing else; .r32 the same of float32; with NAME.r16.json
-///   .npy        NumPy, any type
+/// Begins a raster whose format follows from the extension of `path`, in any case, as writable_formats() lists them.
 /// Throws Error naming the path: kInvalidArgument (no such extension; sizes, or samples that the format cannot hold;
 /// the file exists and overwrite is not set, or is of another kind), kIo.
 [[nodiscard]] std::unique_ptr<RasterSink> create_raster(const std::string& path, const RasterSpec& spec);

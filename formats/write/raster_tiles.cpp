@@ -7,7 +7,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "formats/mosaic/tile_name.h"
+#include "formats/write/tile_name.h"
 #include "isohf/error.h"
 
 namespace isohf {

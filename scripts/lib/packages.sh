@@ -2,7 +2,7 @@
 
 # Of the programs without viewer and modules, on whatever machine.
 ISOHF_PACKAGES_LEAN=(
-  zlib1g-dev libdeflate-dev libtiff-dev libpng-dev libjpeg-dev libexpat1-dev libpugixml-dev libwebp-dev libarchive-dev libgeotiff-dev
+  zlib1g-dev libdeflate-dev libtiff-dev libpng-dev libjpeg-dev libpugixml-dev libwebp-dev libarchive-dev libgeotiff-dev
   libopenexr-dev libtbb-dev libfmt-dev nlohmann-json3-dev libcli11-dev libtomlplusplus-dev libgeographiclib-dev
   libproj-dev libnetcdf-dev nettle-dev libeigen3-dev)
 ISOHF_PACKAGES_BUILD=(

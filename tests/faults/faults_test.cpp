@@ -46,7 +46,7 @@ const std::vector<Job>& jobs() {
       {"convert", {"convert", "in.tif", "out.isohf", "--lossless"}, {"out.isohf"}, true},
       {"convert_over", {"convert", "in.tif", "out.isohf", "--overwrite"}, {"out.isohf"}, true, true},
       {"convert_asc", {"convert", "in.asc", "out.isohf"}, {"out.isohf"}, true},
-      {"convert_npy", {"convert", "in.npy", "out.isohf"}, {"out.isohf"}, true},
+      {"convert_npy", {"convert", "in.npy", "out.isohf", "--nodata", "-32768"}, {"out.isohf"}, true},
       {"export_source", {"export", "in.isohf", "out.tif"}, {"out.tif"}},
       {"export_source_over", {"export", "in.isohf", "out.asc", "--overwrite"}, {"out.asc", "out.prj"}, false, true},
       {"export", {"export", "in.isohf", "out.r16", "--method", "hex"}, {"out.r16", "out.r16.json"}},

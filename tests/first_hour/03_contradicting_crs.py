@@ -52,14 +52,14 @@ CONTRADICTIONS = [
     (utm, "EPSG:32633", "EPSG:32632"), (utm, "EPSG:25832", "EPSG:32632"), (utm, "EPSG:4326", "EPSG:32632"),
     (utm, "+proj=utm +zone=32 +datum=WGS84 +units=km", "EPSG:32632"),
     (degrees, "EPSG:4267", "EPSG:4326"), (feet, "EPSG:2227", "EPSG:2263"), (feet, "EPSG:32118", "EPSG:2263"),
-    (esri, "EPSG:32633", "WGS_1984_UTM_Zone_32N"), (unknown, "EPSG:32632", "Unknown_UTM"),
-    (cf, "EPSG:32632", "degrees"), (km, "EPSG:32633", "WGS_1984_UTM_Zone_32N"), (metres, "EPSG:4326", "metres"),
+    (esri, "EPSG:32633", "EPSG:32632"), (unknown, "EPSG:32632", "Unknown_UTM"),
+    (cf, "EPSG:32632", "degrees"), (km, "EPSG:32633", "EPSG:32632"), (metres, "EPSG:4326", "metres"),
     (metres, "EPSG:2263", "metres"),
     (moon, "EPSG:4326", "SimpleCylindrical Moon"), (mars, "EPSG:32632", "MARS"),
 ]
 # What completes it, and the codes of the system and of its heights that come out.
 COMPLETIONS = [
-    (bare, "EPSG:32632", 32632, None), (bare, "EPSG:2154+5720", 2154, 5720), (bare, UTM32_ESRI, None, None),
+    (bare, "EPSG:32632", 32632, None), (bare, "EPSG:2154+5720", 2154, 5720), (bare, UTM32_ESRI, 32632, None),
     (srtm, "EPSG:4326", 4326, None), (srtm, "WGS 84", 4326, None), (srtm, "EPSG:4326+5773", 4326, 5773),
     (srtm, "+proj=longlat +ellps=WGS84", 4326, None), (degrees, "EPSG:4979", 4326, None),
     (utm, "EPSG:32632+5773", 32632, 5773), (utm, UTM32_ESRI, 32632, None),
@@ -72,7 +72,7 @@ COMPLETIONS = [
 for path, system, own in CONTRADICTIONS:
     if path is None:
         continue
-    found = refuses("convert", path, "a.isohf", "--crs", system, "-q", code=2, words=[path.name, own, "--crs", "contradicts"])
+    found = refuses("convert", path, "a.isohf", "--crs", system, "-q", code=2, words=[path.stem, own, "--crs", "contradicts"])
     check(not (FOLDER / "a.isohf").exists(), f"{found.command}: wrote an archive")
     check("gdal_translate -a_srs" in found.err, f"{found.command}: no way out for a wrong file:\n{found.err}")
     is_map = not system.startswith(("EPSG:4", "+proj=longlat"))

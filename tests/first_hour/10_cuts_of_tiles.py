@@ -80,25 +80,7 @@ for cut in (OLD, NEW):
     check("does not hold" in failed.err, failed.err)
     check(contents(there) == before, f"{cut}: the export that failed changed {names(there)}")
 
-# 5. Tiles of two cuts in one folder (copied there by hand) are refused, and both are named.
-mixed = folder("mixed")
-isohf("export", "b.isohf", mixed / "u.raw", *NEW, "-q")
-old = folder("old")
-isohf("export", "a.isohf", old / "u.raw", *OLD, "-q")
-for path in old.iterdir():
-    if not (mixed / path.name).exists():
-        shutil.copy(path, mixed)
-refuses("convert", *mixed.glob("u_x*_y*.raw"), "-o", "mixed.isohf", words=["u_x", "is a tile of another cut than", "129 x 129", "65 x 65"])
-check(not (FOLDER / "mixed.isohf").exists(), "an archive of mixed tiles")
-# ... one of the new tiles and an old row; another scale; another spacing.
-refuses("convert", *(mixed / f"u_x{x}_y{y}.raw" for x, y in ((0, 0), (1, 0), (2, 0), (3, 0), (2, 1), (3, 1))), "-o", "mixed.isohf",
-        words=["is a tile of another cut than"])
-for name in ("u_x1_y1.raw", "u_x1_y1.raw.json"):
-    isohf("export", "b.isohf", old / "w.raw", *OLD, "-q", "--overwrite")
-    shutil.copy(old / name.replace("u_", "w_"), old / name)
-refuses("convert", *old.glob("u_x*_y*.raw"), "-o", "mixed.isohf", words=["is a tile of another cut than", "raw *"])
-
-# 6. What belongs together is still joined: shared and wide overlaps, a last column and row that are smaller, other
+# 5. What belongs together is still joined: shared and wide overlaps, a last column and row that are smaller, other
 # numbers, coordinates as numbers, tiles of two names over each other, and neighbours of other sizes.
 def hill(x, y):
     return 100.0 + 3.0 * x + 2.0 * y

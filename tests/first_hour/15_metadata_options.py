@@ -56,7 +56,7 @@ for key, value, names in (("quiet", "true", ["quiet"]), ("config", "s.toml", ["c
 # A system that is recorded is a text, never a file's name.
 (FOLDER / "k.prj").write_text("EPSG:32632")
 name = altered("a.isohf", "b.isohf", [('"nodata": "-32768"', '"crs": "k.prj"')])
-refuses("verify", name, "--against", raster, code=1, words=["k.prj", "PROJ does not understand it"])
+refuses("verify", name, "--against", raster, code=2, words=["k.prj", "PROJ does not understand it"])
 
 
 # A raster is viewed through an archive in a folder whose name nobody can foresee, and that no other user can enter.

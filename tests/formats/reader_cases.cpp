@@ -1,13 +1,12 @@
 #include "formats/reader_cases.h"
 
 #include <fmt/format.h>
+#include <zlib.h>
 
 #include "formats/geotiff/tiff_bytes.h"
 #include "formats/grids/dted_cell.h"
-#include "formats/grids/netcdf_bytes.h"
-#include "formats/io/gzipped.h"
-#include "formats/io/tar_archive.h"
-#include "formats/io/zip_archive.h"
+#include "formats/io/packed_bytes.h"
+#include "formats/netcdf/netcdf_bytes.h"
 #include "formats/planetary/pds4_label.h"
 #include "formats/readers.h"
 #include "formats/write/raster_sink.h"
@@ -112,16 +111,6 @@ std::string npy() {
   return std::string("\x93NUMPY\1\0\x76\0", 10) + text + "\n" + counting(12, 2);
 }
 
-std::vector<std::byte> bytes_of(const std::string& text) {
-  const auto bytes = std::as_bytes(std::span(text));
-  return {bytes.begin(), bytes.end()};
-}
-
-std::string zip(const std::string& name, const std::string& contents, bool zip64 = false) {
-  const auto archive = zip_archive({{name, bytes_of(contents)}}, true, zip64);
-  return {reinterpret_cast<const char*>(archive.data()), archive.size()};
-}
-
 const char* const kEhdr =
     "BYTEORDER M\nLAYOUT BIL\nNROWS 3\nNCOLS 4\nNBANDS 1\nNBITS 16\nBANDROWBYTES 8\nTOTALROWBYTES 8\nBANDGAPBYTES 0\n"
     "PIXELTYPE SIGNEDINT\nNODATA -9999\nULXMAP 100.5\nULYMAP 200.5\nXDIM 0.5\nYDIM 0.5\n";
@@ -161,54 +150,49 @@ std::vector<ReaderCase> reader_cases() {
   const std::string esri = "ncols 4\nnrows 3\nxllcorner 100\nyllcorner 200.5\ncellsize 10\nNODATA_value -9999\n";
   const std::string numbers = "1 2.5 3 4\n5 -9999 7e1 8\n9 10 nan 12\n";
   const std::string data = std::string(ISOHF_SOURCE_DIR) + "/tests/formats/data/";
-  const OpenOptions packed = of_channel("terrarium");
-  OpenOptions streamed;
-  streamed.unpacked_bytes = 0;
+  OpenOptions packed;
+  packed.encoding = "terrarium";
   std::vector<ReaderCase> cases = {
-      {"ExrScanLines", "a.exr", written(folder, "a.exr", 5, 4, SampleType::kFloat32), open_exr, {}},
-      {"ExrChannels", "a.exr", written(folder, "a.exr", 4, 3, SampleType::kFloat16, 4), open_exr, {}},
-      {"TiffTagsFirst", "a.tif", striped_tiff(false).build(), open_tiff, {}},
-      {"TiffBigEndian", "a.tif", striped_tiff(true).build(), open_tiff, {}},
-      {"TiffStripsDeflated", "a.tif", written(folder, "a.tif", 9, 7, SampleType::kInt16), open_tiff, {}},
-      {"TiffTiles", "a.tif", tiled_tiff().build(), open_tiff, {}},
-      {"TiffMasked", "a.tif", masked_tiff().build(), open_tiff, {}},
-      {"PngGray16", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint16), open_png, {}},
-      {"PngPacked", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint8, 3), open_png, packed},
-      {"EsriAsciiGrid", "a.asc", esri + numbers, open_ascii_grid, {}},
-      {"GzippedAsciiGrid", "a.asc.gz", gzipped(esri + numbers), open_ascii_grid, {}},
-      {"EhdrHeader", "a.hdr", kEhdr, open_header_grid, {}},
-      {"EhdrWorldFile", "a.blw", "0.5\n0\n0\n-0.5\n100.5\n200.5\n", open_header_grid, {}},
-      {"EhdrProjection", "a.prj", kWkt, open_header_grid, {}},
-      {"GridFloatSamples", "a.flt", counting(12, 4), open_header_grid, {}},
-      {"Pds3", "a.img", pds3(), open_pds3, {}},
-      {"Isis3", "a.cub", isis3(), open_isis3, {}},
-      {"Isis3Label", "a.lbl", isis3_label("^Core = core.cub\n    "), open_isis3, {}},
-      {"Npy", "a.npy", npy(), open_npy, {}},
-      {"Npz", "a.npz", zip("z.npy", npy()), open_npz, {}},
-      {"NpzZip64", "a.npz", zip("z.npy", npy(), true), open_npz, {}},
-      {"Dted", "a.dt0", dted_cell(3, 4, [](int c, int p) { return 256 + 10 * c + p; }), open_dted, {}},
-      {"Hgt", "N10E010.hgt", counting(25, 2), open_hgt, {}},
-      {"ZippedHgt", "N10E010.hgt.zip", zip("N10E010.hgt", counting(25, 2)), open_hgt, {}},
-      {"Vrt", "a.vrt", kVrt, open_vrt, {}},
-      {"EnviHeader", "a.hdr", kEnvi, open_envi, {}},
-      {"EnviSamples", "a.dat", "  " + counting(24, 2), open_envi, {}},
-      {"NetcdfClassic", "a.nc", netcdf(), open_netcdf, {}},
-      {"NetcdfByColumns", "a.nc", netcdf(true), open_netcdf, {}},
-      {"XyzText", "a.xyz", "x y z\n0 0 1\n1 0 2.5\n0 1 3\n1 1 4\n", open_xyz, {}},
-      {"Pds4Label", "a.xml", pds4_label("a.dat"), open_pds4, {}},
-      {"Pds4Samples", "a.dat", counting(7, 2), open_pds4, {}},
-      {"StreamedAsciiGrid", "a.asc.gz", gzipped(esri + numbers), open_ascii_grid, streamed},
-      {"ZipOfGrid", "a.zip", zip("d/a.asc", esri + numbers), open_packed, {}},
-      {"TarOfGrid", "a.tar", tar_archive({{"d/a.asc", esri + numbers}}), open_packed, {}},
-      {"Webp", "a.webp", read_file(data + "small.webp"), open_webp, packed},
-      {"Pmtiles", "a.pmtiles", read_file(data + "small.pmtiles"), open_pmtiles, {}},
-      {"PngDescription", "described.png.json", "", open_png, {}},
-      {"RawDescription", "a.r16.json", "", open_raw, {}},
+      {"ExrScanLines", "a.exr", written(folder, "a.exr", 5, 4, SampleType::kFloat32), kExrFormat.open, {}},
+      {"ExrChannels", "a.exr", written(folder, "a.exr", 4, 3, SampleType::kFloat16, 4), kExrFormat.open, {}},
+      {"TiffTagsFirst", "a.tif", striped_tiff(false).build(), kTiffFormat.open, {}},
+      {"TiffBigEndian", "a.tif", striped_tiff(true).build(), kTiffFormat.open, {}},
+      {"TiffStripsDeflated", "a.tif", written(folder, "a.tif", 9, 7, SampleType::kInt16), kTiffFormat.open, {}},
+      {"TiffTiles", "a.tif", tiled_tiff().build(), kTiffFormat.open, {}},
+      {"TiffMasked", "a.tif", masked_tiff().build(), kTiffFormat.open, {}},
+      {"PngGray16", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint16), kPngFormat.open, {}},
+      {"PngPacked", "a.png", written(folder, "a.png", 6, 5, SampleType::kUint8, 3), kPngFormat.open, packed},
+      {"EsriAsciiGrid", "a.asc", esri + numbers, kAsciiGridFormat.open, {}},
+      {"EhdrHeader", "a.hdr", kEhdr, kHeaderGridFormat.open, {}},
+      {"EhdrWorldFile", "a.blw", "0.5\n0\n0\n-0.5\n100.5\n200.5\n", kHeaderGridFormat.open, {}},
+      {"EhdrProjection", "a.prj", kWkt, kHeaderGridFormat.open, {}},
+      {"GridFloatSamples", "a.flt", counting(12, 4), kHeaderGridFormat.open, {}},
+      {"Pds3", "a.img", pds3(), kPds3Format.open, {}},
+      {"Isis3", "a.cub", isis3(), kIsis3Format.open, {}},
+      {"Isis3Label", "a.lbl", isis3_label("^Core = core.cub\n    "), kIsis3Format.open, {}},
+      {"Npy", "a.npy", npy(), kNpyFormat.open, {}},
+      {"Dted", "a.dt0", dted_cell(3, 4, [](int c, int p) { return 256 + 10 * c + p; }), kDtedFormat.open, {}},
+      {"Hgt", "N10E010.hgt", counting(25, 2), kHgtFormat.open, {}},
+      {"Vrt", "a.vrt", kVrt, kVrtFormat.open, {}},
+      {"EnviHeader", "a.hdr", kEnvi, kEnviFormat.open, {}},
+      {"EnviSamples", "a.dat", "  " + counting(24, 2), kEnviFormat.open, {}},
+      {"NetcdfClassic", "a.nc", netcdf(), kNetcdfFormat.open, {}},
+      {"NetcdfByColumns", "a.nc", netcdf(true), kNetcdfFormat.open, {}},
+      {"XyzText", "a.xyz", "x y z\n0 0 1\n1 0 2.5\n0 1 3\n1 1 4\n", kXyzFormat.open, {}},
+      {"Pds4Label", "a.xml", pds4_label("a.dat"), kPds4Format.open, {}},
+      {"Pds4Samples", "a.dat", counting(7, 2), kPds4Format.open, {}},
+      {"GzipOfGrid", "a.asc.gz", gzipped(esri + numbers), kPackedFormat.open, {}},
+      {"XzOfGrid", "a.asc.xz", test::packed({{"", esri + numbers}}, "raw", "xz"), kPackedFormat.open, {}},
+      {"ZipOfHgt", "a.zip", test::packed({{"d/N10E010.hgt", counting(25, 2)}}, "zip"), kPackedFormat.open, {}},
+      {"SevenZipOfGrid", "a.7z", test::packed({{"d/a.asc", esri + numbers}}, "7zip"), kPackedFormat.open, {}},
+      {"TarOfGrid", "a.tar", test::packed({{"d/a.asc", esri + numbers}}, "ustar"), kPackedFormat.open, {}},
+      {"Webp", "a.webp", read_file(data + "small.webp"), kWebpFormat.open, packed},
+      {"Pmtiles", "a.pmtiles", read_file(data + "small.pmtiles"), kPmtilesFormat.open, {}},
+      {"PngDescription", "described.png.json", "", kPngFormat.open, {}},
+      {"RawDescription", "a.r16.json", "", kRawFormat.open, {}},
   };
-#ifdef ISOHF_WITH_NETCDF
-  cases.push_back({"Netcdf4", "a.nc", read_file(data + "lat_lon.nc"), open_netcdf4, {}});
+  cases.push_back({"Netcdf4", "a.nc", read_file(data + "lat_lon.nc"), kNetcdfFormat.open, {}});
   cases.back().share = 100;
-#endif
   const auto find = [&](const char* name) -> ReaderCase& {
     for (ReaderCase& each : cases) {
       if (each.name == name) return each;
@@ -260,8 +244,9 @@ std::vector<ReaderCase> reader_cases() {
   find("RawDescription").shortest_valid = find("RawDescription").bytes.size() - 1;
   find("TiffStripsDeflated").shortest_valid = 1;  // the tags that isohf writes come last, and not all are needed
   find("TiffMasked").shortest_valid = 1;          // the mask's directory, without which the image opens with a warning
-  for (const char* name : {"ZipOfGrid", "TarOfGrid"}) find(name).share = 4;
-  find("Hgt").shortest_valid = 1;  // another square
+  for (const char* name : {"GzipOfGrid", "XzOfGrid", "ZipOfHgt", "SevenZipOfGrid", "TarOfGrid"}) find(name).share = 4;
+  find("TarOfGrid").shortest_valid = 1024;  // header and contents, without the zeros behind them
+  find("Hgt").shortest_valid = 1;           // another square
   return cases;
 }
 

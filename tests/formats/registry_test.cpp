@@ -136,8 +136,15 @@ TEST(OpenSource, NamesForeignFilesAndTheCommandThatHelps) {
   const std::pair<std::string, std::string> cases[] = {
       {"%PDF-1.4\n", "this is a PDF document; isohf formats lists what is read"},
       {"LASF\x01\x02", "this is a LAS point cloud; PDAL grids it: pdal translate " + path},
+      {"ASTM-E57", "this is an E57 point cloud; PDAL grids it: pdal translate " + path},
+      {"\x0e\x03\x13\x01", "this is an HDF4 file; gdal_translate " + path},
+      {"NITF02.10", "this is a NITF raster; gdal_translate " + path},
+      {"SQLite format 3", "this is an SQLite database, as a GeoPackage is one; gdal_translate " + path},
+      {std::string("\0\0\x27\x0a", 4), "this is a shapefile, which holds points or outlines; gdal_grid makes"},
+      {"BZh", "this is a bzip2 file; a name that ends in .bz2 has it unpacked"},
+      {"Rar!", "this is a RAR file; unpack it first"},
+      {std::string("\xff\xfeX\0Y\0", 6), "this is text in UTF-16; iconv -f UTF-16 -t UTF-8 " + path},
       {std::string("PK\x03\x04") + std::string(26, '\0') + "isohf.json", "an isohf archive; isohf export " + path},
-      {std::string("PK\x03\x04") + std::string(40, '\0'), "this is a ZIP file; it is damaged or cut off"},
       {"GRIB\x01\x02", "this is a GRIB file; gdal_translate " + path + " OUT.tif makes a GeoTIFF of it"},
       {std::string("\x01\x02\x03", 3), "unknown format; isohf formats lists what is read"}};
   for (const auto& [content, message] : cases) {
@@ -181,6 +188,12 @@ TEST(OpenSource, NamesTheCommandThatConvertsARasterOfAnotherProgram) {
       {"a.mbtiles", "SQLite format 3", "an MBTiles file", "pmtiles convert"},
       {"tiles.db", "SQLite format 3" + std::string(53, '\0') + "MPBX", "an MBTiles file", "pmtiles convert"},
       {"a.img", "EHFA_HEADER_TAG", "an ERDAS Imagine raster"},
+      {"a.map", "RUU CROSS SYSTEM MAP FORMAT", "a PCRaster map"},
+      {"a.ers", "DatasetHeader Begin\n", "an ER Mapper raster"},
+      {"w001001.adf", std::string("\0\0\x27\x0a", 4), "an Arc/Info grid"},
+      {"a.bag", "\x89HDF\r\n\x1a\n", "a BAG bathymetry grid"},
+      {"a.gpkg", "SQLite format 3", "a GeoPackage"},
+      {"a.npz", "PK\x03\x04", "a NumPy archive", "np.save(\"a.npy\", np.load(\""},
   };
   for (const Row& row : rows) {
     SCOPED_TRACE(row.name);
@@ -191,7 +204,8 @@ TEST(OpenSource, NamesTheCommandThatConvertsARasterOfAnotherProgram) {
     EXPECT_EQ(native_format_of(path, {}), nullptr);
     const Error error = refusal(path);
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
-    const std::string says = path + ": this is " + row.says + "; " + row.command + ' ' +
+    const std::string says = path + ": this is " + row.says + "; " + row.command +
+                             (row.command.ends_with('"') ? "" : " ") +
                              (folder / (row.converted.empty() ? row.name : row.converted));
     EXPECT_THAT(error.what(), HasSubstr(says));
     EXPECT_THAT(error_of([&] { (void)open_photo(path); }).what(), HasSubstr(says));

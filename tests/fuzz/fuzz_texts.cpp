@@ -5,10 +5,10 @@
 #include <cstdlib>
 #include <string>
 
-#include "formats/georeference/files_beside.h"
+#include "formats/georeference/sidecars.h"
 #include "isohf/error.h"
-#include "isohf/projection/crs.h"
-#include "isohf/projection/source_system.h"
+#include "isohf/projection/crs/crs.h"
+#include "isohf/projection/crs/source_system.h"
 #include "support/temporary_folder.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -27,7 +27,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   info.height = 4;
   isohf::test::write_file(info.path + ".aux.xml", text);
   try {
-    read_auxiliary_metadata(info, 1);
+    read_sidecars(info, 1);
   } catch (const isohf::Error& error) {
     const std::string message = error.what();
     if (!message.starts_with(info.path) || message.find_first_of("\n\r") != std::string::npos) std::abort();

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "isohf/base/number_text.h"
+#include "isohf/base/text/number_text.h"
 #include "isohf/projection/projection_wkt.h"
 
 namespace isohf::cli {

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <limits>
 
-#include "isohf/base/number_text.h"
+#include "isohf/base/text/number_text.h"
 #include "isohf/error.h"
 
 namespace isohf::cli {

@@ -32,11 +32,6 @@ void add_memory_option(CLI::App& line, WorkOptions& options) {
          [&](const std::string& text) { options.memory_bytes = parse_bytes(text); });
 }
 
-std::uint64_t WorkOptions::unpacked_bytes(std::uint64_t wanted) const {
-  const std::uint64_t bound = job_from(*this).bound_bytes();
-  return bound == 0 ? wanted : std::min(wanted, bound / 3);
-}
-
 std::uint64_t WorkOptions::reader_bytes(std::uint64_t wanted) const {
   const std::uint64_t bound = job_from(*this).bound_bytes();
   return bound == 0 ? wanted : std::min(wanted, bound / 8);

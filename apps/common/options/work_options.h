@@ -16,8 +16,6 @@ struct WorkOptions {
   std::string scratch_folder;
   ProgressMode progress = ProgressMode::kAuto;
 
-  /// The most that is held of packed contents.
-  [[nodiscard]] std::uint64_t unpacked_bytes(std::uint64_t wanted) const;
   /// What a reader may keep of decoded samples (OpenOptions::buffer_bytes): an eighth of the memory, `wanted` at most.
   [[nodiscard]] std::uint64_t reader_bytes(std::uint64_t wanted) const;
 };

@@ -15,7 +15,7 @@
 #include "isohf/base/arena.h"
 #include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
-#include "isohf/projection/crs.h"
+#include "isohf/projection/crs/crs.h"
 #include "isohf/restore/raster/export_grid.h"
 #include "isohf/restore/raster/raster_samples.h"
 #include "open_archive.h"

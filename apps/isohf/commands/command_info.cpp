@@ -275,6 +275,7 @@ Run add_info(CLI::App& line, Common& common) {
   line.add_flag("--stats", options.stats, "Read all samples of a raster for their range, mean and nodata");
   group(line, "Input");
   add_part_options(line, options.open);
+  add_scale_options(line, options.open);
   add_raw_option(line, options.open);
   line.footer(kInfoFooter);
   return [kept, &line] {

@@ -8,8 +8,8 @@
 #include <optional>
 
 #include "commands/command.h"
-#include "formats/io/text.h"
 #include "formats/write/raster_sink.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
 #include "isohf/restore/sample_grids.h"
 #include "isohf/shade.h"

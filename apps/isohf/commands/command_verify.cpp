@@ -14,7 +14,7 @@
 #include "input/options_source.h"
 #include "input/source_inputs.h"
 #include "isohf/error.h"
-#include "isohf/projection/crs.h"
+#include "isohf/projection/crs/crs.h"
 #include "isohf/surface.h"
 #include "isohf/verify.h"
 #include "isohf/verify/accuracy/same_source.h"
@@ -61,7 +61,6 @@ std::unique_ptr<HeightSource> open_as_recorded(const VerifyOptions& options, con
   const SourceRecord& record = metadata.source;
   const std::vector<std::string> files = expand_inputs(options.against, false);
   RecordedInput input = recorded_input(record.options.value_or(RecordedOptions{}));
-  input.open.unpacked_bytes = options.work.unpacked_bytes(input.open.unpacked_bytes);
   input.open.buffer_bytes = options.work.reader_bytes(input.open.buffer_bytes);
   if (!options.geoid.path.empty()) {
     input.geoid = options.geoid;

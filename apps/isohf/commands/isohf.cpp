@@ -29,8 +29,8 @@ constexpr const char* kIsohfFooter = R"(Results go to standard output, everythin
 
 Exit status: 0 success, 1 failure, 2 wrong usage, 3 differences found (verify, diff), 130 interrupted.
 
-Environment: ISOHF_MODULE_PATH is the folder of optional modules (OpenImageIO, PROJ, netCDF) [default: beside the program,
-then ../lib/isohf]. ISOHF_SIMD=off disables vector code, without changing results. NO_COLOR turns colours off,
+Environment: ISOHF_MODULE_PATH is the folder of the module for OpenImageIO and of isohf-netcdf-probe [default: beside the
+program, then ../lib/isohf]. ISOHF_SIMD=off disables vector code, without changing results. NO_COLOR turns colours off,
 CLICOLOR_FORCE=1 keeps them in pipes.
 
 Examples:

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include "isohf/error.h"
-#include "isohf/projection/source_system.h"
-#include "isohf/restore/archive_coordinates.h"
-#include "isohf/restore/source_place.h"
+#include "isohf/projection/crs/source_system.h"
+#include "isohf/restore/place/archive_coordinates.h"
+#include "isohf/restore/place/source_place.h"
 #include "isohf/surface.h"
 
 namespace isohf::cli {

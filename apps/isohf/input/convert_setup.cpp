@@ -10,12 +10,12 @@
 
 #include "formats/io/file_stamp.h"
 #include "input/options_source.h"
-#include "isohf/base/number_text.h"
+#include "isohf/base/text/number_text.h"
 #include "isohf/convert/frame/source_frame.h"
 #include "isohf/error.h"
 #include "isohf/photo/texture_cutter.h"
 #include "isohf/picture.h"
-#include "isohf/projection/crs.h"
+#include "isohf/projection/crs/crs.h"
 #include "isohf/resampling.h"
 #include "options/command_line.h"
 #include "options/option_values.h"
@@ -215,8 +215,6 @@ void complete(const CLI::App& line, ConvertCommandOptions& options) {
 }
 
 Prepared prepare(ConvertCommandOptions& options, std::vector<std::string> files) {
-  // What is packed shares the memory with what is read from it, and with the tiles.
-  options.open.unpacked_bytes = options.work.unpacked_bytes(options.open.unpacked_bytes);
   options.open.buffer_bytes = options.work.reader_bytes(options.open.buffer_bytes);
   PlanRequest& plan = options.convert.plan;
   options.inputs.onto = plan.ground.projection;

@@ -17,6 +17,13 @@ void add_part_options(CLI::App& line, OpenOptions& options) {
   option(line, "--part", "NAME|N",
          "Which file of an archive, part of an OpenEXR, image of a TIFF (from 0) or zoom level of tiles to read",
          options.part);
+  option(line, "--encoding", "terrarium|mapbox|gsi|rgba-float",
+         "Decode elevations packed into the colours of a picture or its tiles [default: as the file says]",
+         [&options](const std::string& text) {
+           (void)parse_word(text, {"terrarium", "mapbox", "gsi", "rgba-float"});
+           options.encoding = text;
+         });
+  exclusive(line, {"--channel", "--encoding"});
 }
 
 void add_raw_option(CLI::App& line, OpenOptions& options) {
@@ -25,16 +32,23 @@ void add_raw_option(CLI::App& line, OpenOptions& options) {
          [&options](const std::string& text) { options.raw = raw_layout_from_string(text); });
 }
 
+void add_scale_options(CLI::App& line, OpenOptions& options) {
+  option(line, "--z-scale", "FACTOR", "Multiply the file's elevations by FACTOR [default: 1]",
+         [&options](const std::string& text) {
+           const double scale = parse_number(text);
+           if (std::abs(scale) < 1e-20 || std::abs(scale) > 1e20) {
+             throw Error(ErrorCode::kInvalidArgument,
+                         "found '" + text + "', must be from 1e-20 to 1e20, above or below 0");
+           }
+           options.z_scale = scale;
+         });
+  option(line, "--z-offset", "NUMBER", "Then add NUMBER [default: 0]",
+         [&options](const std::string& text) { options.z_offset = parse_number_in(text, -1e20, 1e20); });
+}
+
 void add_source_options(CLI::App& line, OpenOptions& options) {
   group(line, "Reading the input");
   add_part_options(line, options);
-  option(line, "--encoding", "terrarium|mapbox|rgba-float",
-         "Decode elevations packed into the colours of PNG or WebP [default: if unmistakable]",
-         [&options](const std::string& text) {
-           (void)parse_word(text, {"terrarium", "mapbox", "rgba-float"});
-           options.channel = text;  // one more channel of the picture, as which archives record it
-         });
-  exclusive(line, {"--channel", "--encoding"});
   choice<std::optional<Registration>>(
       line, "--registration", {{"area", Registration::kArea}, {"point", Registration::kPoint}, {"auto", std::nullopt}},
       "Samples are the middle of pixels (area) or grid points (point) [default: as the file says, else area with a "
@@ -50,17 +64,7 @@ void add_source_options(CLI::App& line, OpenOptions& options) {
                     options.voids.fill = true;
                     if (text) options.voids.fill_distance = parse_whole_number(*text, 1, kMaxFillDistance);
                   });
-  option(line, "--z-scale", "FACTOR", "Multiply the file's elevations by FACTOR [default: 1]",
-         [&options](const std::string& text) {
-           const double scale = parse_number(text);
-           if (std::abs(scale) < 1e-20 || std::abs(scale) > 1e20) {
-             throw Error(ErrorCode::kInvalidArgument,
-                         "found '" + text + "', must be from 1e-20 to 1e20, above or below 0");
-           }
-           options.z_scale = scale;
-         });
-  option(line, "--z-offset", "NUMBER", "Then add NUMBER [default: 0]",
-         [&options](const std::string& text) { options.z_offset = parse_number_in(text, -1e20, 1e20); });
+  add_scale_options(line, options);
   add_raw_option(line, options);
   option(line, "--sample-spacing", "LENGTH",
          "Distance between samples, instead of the file's: metres, or with a unit as in 100ft",

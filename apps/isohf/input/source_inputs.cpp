@@ -149,7 +149,7 @@ OpenedInputs open_inputs(std::vector<std::string> files, const SourceInputs& inp
     MosaicPlan plan;
     Arena(Job{.threads = work.threads}).execute([&] { plan = plan_mosaic(files, options, inputs.box, inputs.onto); });
     opened.is_reprojected = plan.is_reprojected;
-    opened.note.name = fmt::format("mosaic of {} files", files.size());
+    opened.note.name = plan.info.path;
     describe_mosaic(plan, inputs.overlap, opened.note);
     opened.source = std::make_unique<MosaicSource>(opened.note.name, std::move(plan), options, inputs.overlap);
   }

@@ -1,11 +1,11 @@
 #include "output/output_kinds.h"
 
-#include "formats/io/text.h"
 #include "formats/registry.h"
 #include "formats/write/encoders.h"
 #include "formats/write/raster_sink.h"
 #include "isohf/archive/writer.h"
 #include "isohf/base/output_file.h"
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
 #include "output/output_file.h"
 

@@ -4,12 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
-#include "isohf/archive/container/archive_directory.h"
-#include "isohf/base/file.h"
+#include "formats/io/foreign_file.h"
 #include "isohf/error.h"
-#include "isohf/projection/source_system.h"
+#include "isohf/projection/crs/source_system.h"
 #include "isohf/sampling/source/source_rows.h"
 #include "options/describe.h"
 #include "output/standard_output.h"
@@ -57,7 +55,7 @@ void add_statistics(const SourceSurvey& survey, Report& report) {
   const SourceScan scan = survey.scan();
   const bool has_elevations = scan.valid > 0;
   ordered_json undeclared = ordered_json::array();
-  for (const UndeclaredVoid& found : survey.undeclared_voids()) {
+  for (const UndeclaredVoid& found : survey.outliers().voids) {
     undeclared.push_back({{"value", found.value}, {"count", found.count}});
   }
   const ordered_json statistics = {{"samples", scan.valid + scan.voids},
@@ -78,15 +76,8 @@ void add_statistics(const SourceSurvey& survey, Report& report) {
 
 bool is_archive(const std::string& path, const OpenOptions& options) {
   if (options.raw) return false;
-  const bool is_known = native_format_of(path, options) != nullptr;
-  // A local file header, then the first member's name at byte 30.
-  std::vector<std::byte> head(30 + std::strlen(kMetadataName));
-  head.resize(File(path, File::Mode::kRead).read_at(0, head));
-  const std::string start(reinterpret_cast<const char*>(head.data()), head.size());
-  const bool is_zip = start.starts_with("PK\x03\x04");
-  if (is_zip && start.substr(std::min<std::size_t>(30, start.size())) == kMetadataName) return true;
-  if (is_known || path.ends_with(".npz")) return false;
-  return is_zip || path.ends_with(".isohf");
+  if (native_format_of(path, options) != nullptr) return false;
+  return path.ends_with(".isohf") || foreign_file(path).is == "an isohf archive";
 }
 
 std::string describe_reference(const ReferenceSystem& system) {
@@ -200,7 +191,7 @@ RasterInfo describe_raster(const std::string& path, const OpenOptions& options, 
   if (statistics != nullptr) {
     const SourceSurvey survey = survey_whole(*source, *statistics);
     add_statistics(survey, report);
-    if (const std::string warning = survey.warning(); !warning.empty()) warnings.push_back(warning);
+    if (const std::string warning = survey.warning(); !warning.empty()) warnings.push_back(loss(warning));
   }
   report.add("warnings", json_from(warnings));
   for (const Warning& warning : warnings) raster.warnings.push_back(warning.reworded(path + ": " + warning));

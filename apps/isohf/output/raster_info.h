@@ -6,7 +6,7 @@
 #include "formats/registry.h"
 #include "isohf/job.h"
 #include "isohf/raster.h"
-#include "isohf/restore/source_place.h"
+#include "isohf/restore/place/source_place.h"
 #include "output/report.h"
 
 namespace isohf::cli {

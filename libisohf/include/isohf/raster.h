@@ -134,9 +134,7 @@ class HeightSource {
 
   /// Bytes that are kept at most from one call to the next, for decoded samples above all: within
   /// OpenOptions::buffer_bytes unless the source cannot do with so few; 0: none to speak of.
-  [[nodiscard]] virtual std::uint64_t buffer_bytes() const { return buffer_bytes(UINT64_MAX); }
-  virtual void limit_buffers(std::uint64_t /*bytes*/) {}
-  [[nodiscard]] virtual std::uint64_t buffer_bytes(std::uint64_t /*limit*/) const { return 0; }
+  [[nodiscard]] virtual std::uint64_t buffer_bytes() const { return 0; }
 
   /// The source whose samples are the file's own: this one, or what it is made of where it changes them.
   [[nodiscard]] virtual HeightSource& as_stored() { return *this; }
@@ -152,9 +150,9 @@ struct RawLayout {
 
 /// What a user may say about an input that the file does not, or says wrongly.
 struct OpenOptions {
-  std::string channel;                       ///< channel name or zero-based number; empty: the reader's choice
-  std::string part;                          ///< of a file of several parts: name or zero-based number
-  std::string encoding;                      ///< of elevations packed into colours: "terrarium", "mapbox", ...; or empty
+  std::string channel;   ///< channel name or zero-based number; empty: the reader's choice
+  std::string part;      ///< of a file of several parts: name or zero-based number
+  std::string encoding;  ///< of elevations packed into colours: "terrarium", "mapbox", ...; or empty
   std::optional<Registration> registration;  ///< overrides the file's
   std::vector<double> void_values;           ///< override the file's; empty: the file's
   std::optional<double> z_scale;             ///< elevation = the file's own * z_scale + z_offset
@@ -163,9 +161,6 @@ struct OpenOptions {
   /// "EPSG:2154", WKT, a PROJ string: completes what the file says of its system.
   std::string reference_system;
   std::optional<RawLayout> raw;  ///< the file is nothing but these samples, whatever its name and content say
-  /// What all files that are open at once may hold of the contents that they have packed (.gz, .zip): contents that
-  /// do not fit are unpacked piece by piece whenever they are read.
-  std::uint64_t unpacked_bytes = std::uint64_t{256} << 20U;
   /// Most bytes of decoded samples that a reader keeps from one call to the next.
   std::uint64_t buffer_bytes = std::uint64_t{256} << 20U;
   VoidTreatment voids;  ///< for with_voids_treated(), which is for the caller: open_raster leaves voids as they are
@@ -184,8 +179,8 @@ struct OpenOptions {
 [[nodiscard]] std::unique_ptr<HeightSource> with_voids_treated(std::unique_ptr<HeightSource> source,
                                                                const VoidTreatment& treatment, const Job& job = {});
 
-/// Names a folder in which the modules (OpenImageIO, netCDF-4) are looked for first; empty: only beside the program
-/// and in ../lib/isohf. A program calls it before it opens anything.
+/// Names a folder in which the module for OpenImageIO and isohf-netcdf-probe are looked for first; empty: only beside the
+/// program and in ../lib/isohf. A program calls it before it opens anything.
 void set_module_folder(const std::string& folder);
 
 }  // namespace isohf

@@ -6,6 +6,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdlib>
 #include <iterator>
 #include <limits>
 #include <vector>
@@ -323,12 +324,24 @@ void heights_from_samples(const SourceInfo& info, double datum, std::span<const 
   with_stored_type(info.sample_type, [&](auto sample) { convert<decltype(sample)>(info, datum, raw.data(), heights); });
 }
 
+std::string shortest_text(SampleType type, double value) {
+  const bool is_single = type == SampleType::kFloat32 || type == SampleType::kFloat16;
+  const std::string text = fmt::format("{:.6g}", value);
+  const double read = std::strtod(text.c_str(), nullptr);
+  if (is_single ? static_cast<float>(read) == static_cast<float>(value) : read == value) return text;
+  return is_single ? fmt::format("{}", static_cast<float>(value)) : fmt::format("{}", value);
+}
+
 std::string void_values_with(const SourceInfo& info, std::vector<double> values) {
-  // What is declared goes on to mean it, but what a range makes void anyway; as many digits as make the same number.
+  // What is declared goes on to mean it, but what a range makes void anyway.
   const auto is_void_anyway = [&](double value) { return !(value >= info.valid_min && value <= info.valid_max); };
   const auto& declared = info.void_values_of_files.empty() ? info.void_values : info.void_values_of_files;
   std::ranges::remove_copy_if(declared, std::inserter(values, values.begin()), is_void_anyway);
-  return fmt::format("`void_values` {}", fmt::join(values, ","));
+  std::string text = "`void_values`";
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    text.append(i == 0 ? " " : ",").append(shortest_text(info.sample_type, values[i]));
+  }
+  return text;
 }
 
 }  // namespace isohf

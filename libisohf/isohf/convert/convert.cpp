@@ -491,7 +491,7 @@ ErrorEstimate estimate_error(HeightSource& source, const ConvertOptions& options
                              std::optional<Quantisation> codes) {
   const SourceInfo& info = source.info();
   const Plan plan = plan_conversion(info, options);
-  const bool is_unpacked = info.format == "PNG" || info.path.ends_with(".gz");
+  const bool is_unpacked = info.format == "PNG";
   const bool is_slow = info.fill_distance > 0 || is_unpacked;
   ErrorEstimate estimate;
   if (is_slow && info.width > kMostUnpacked / info.height) {

@@ -11,7 +11,7 @@
 #include "isohf/archive/planes/plane_builder.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/memory/memory_budget.h"
-#include "isohf/base/number_text.h"
+#include "isohf/base/text/number_text.h"
 #include "isohf/convert/stages/residual_stage.h"
 #include "isohf/convert/stages/seed_stage.h"
 #include "isohf/convert/stages/texture_stage.h"
@@ -141,8 +141,7 @@ class Estimate {
     const auto vertices = static_cast<double>(plan_.grid.shape().stored_vertex_count());
     const double program = kProgramBytes + threads_ * kThreadBytes + threads_ * vertices * kBytesPerVertex +
                            kBytesPerTile * static_cast<double>(plan_.grid.tile_count()) +
-                           static_cast<double>(source_.buffer_bytes()) +
-                           static_cast<double>(map_bytes());
+                           static_cast<double>(source_.buffer_bytes()) + static_cast<double>(map_bytes());
     const double seeds =
         options_.shadow_seeds ? static_cast<double>(SeedRow::memory_bytes(plan_.grid, memory.seeds_in_scratch)) : 0.0;
     const auto waiting =

@@ -3,7 +3,7 @@
 #include <array>
 #include <cctype>
 
-#include "isohf/base/text.h"
+#include "isohf/base/text/text.h"
 
 namespace isohf {
 namespace {

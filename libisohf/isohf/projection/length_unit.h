@@ -12,14 +12,11 @@ struct LinearUnit {
   double metres = 1.0;  ///< metres in one unit
 };
 
-/// By EPSG unit code (9001 is the metre); nullopt for a code that isohf does not know.
-[[nodiscard]] std::optional<LinearUnit> linear_unit(int epsg);
-
-/// By the name or abbreviation that files use, in any case: "m", "Meters", "ft", "ftUS", ...; nullopt for any other
-/// text.
+/// By the name or abbreviation that files use, in any case: "m", "Meters", "ft", "ftUS", ..., also several or a part of
+/// one: "0.1 m", "1/10 m", "10 cm". nullopt for any other text.
 [[nodiscard]] std::optional<LinearUnit> linear_unit(std::string_view name);
 
-/// What a length of so many metres is called; "unit" where it has no name.
-[[nodiscard]] std::string linear_unit_name(double metres);
+/// By its length, which databases give with 15 digits; called "unit" if it has no name.
+[[nodiscard]] LinearUnit length_unit(double metres);
 
 }  // namespace isohf

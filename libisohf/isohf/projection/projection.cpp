@@ -149,9 +149,8 @@ class Projection::Map::System final : public Map {
  public:
   explicit System(const ProjectionSpec& map_spec) : Map(map_spec) {
     if (!spec.map) {
-      throw Error(ErrorCode::kUnsupported,
-                  fmt::format("the map {} needs the PROJ module, and is not understood without",
-                              spec.system.name.empty() ? spec.system.text : spec.system.name));
+      throw Error(ErrorCode::kUnsupported, fmt::format("the map {} is not understood yet; see understand_world()",
+                                                       spec.system.name.empty() ? spec.system.text : spec.system.name));
     }
   }
   [[nodiscard]] MapPoint forward(double longitude, double latitude) const override {

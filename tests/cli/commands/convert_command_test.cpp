@@ -187,7 +187,10 @@ TEST_F(ConvertCommand, MemoryThatRunsOutIsOneLine) {
     RunOptions small;
     small.address_space_bytes = kibibytes << 10U;
     const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "-j", "1"}, small);
-    if (result.exit_code == 127) continue;
+    // A library that is loaded gives up before the program begins.
+    const bool is_begun = result.exit_code != 127 && result.err.find("GnuTLS") == std::string::npos &&
+                          result.err != "terminate called without an active exception\n";
+    if (!is_begun) continue;
     if (result.exit_code == 0) {
       ++made;
       continue;

@@ -231,7 +231,7 @@ TEST_F(ExportLike, RefusesWhatHasNoPlaceOnTheMap) {
   ASSERT_EQ(run("utm.tif", {"--to-crs", "none", "-q"}).exit_code, 0);
   convert("wide.flt", "lambert-conformal");
   ASSERT_EQ(run("cone.tif", {"--to-crs", "none", "-q"}).exit_code, 0);
-  refuses("utm.tif", "is in metres of \"utm zone 32N\"; the archive's input was in degrees and was projected");
+  refuses("utm.tif", "is in metres of EPSG:32632; the archive's input was in degrees and was projected");
   refuses("wide.flt", "--method hex goes along rows", {"--method", "hex"});
   convert("wide.flt", "lambert-conformal:44,48,8");
   refuses("cone.tif", "a place there; bring it to degrees (gdalwarp)");
@@ -249,7 +249,7 @@ TEST_F(ExportLike, RefusesWhatHasNoPlaceOnTheMap) {
   std::ofstream(folder / "old.prj") << "GEOGCS[\"NAD27\",DATUM[\"D_North_American_1927\",SPHEROID[\"Clarke_1866\","
                                        "6378206.4,294.9786982]],PRIMEM[\"Greenwich\",0],"
                                        "UNIT[\"degree\",0.0174532925199433]]";
-  refuses("old.flt", "is in \"NAD27\" with an equatorial radius of 6378206.4 m, the archive's source in \"WGS 84\"");
+  refuses("old.flt", "is in EPSG:4267 with an equatorial radius of 6378206.4 m, the archive's source in EPSG:4326");
 }
 
 TEST_F(ExportLike, NeverTakesDegreesForMetresBesideAMap) {
@@ -259,7 +259,7 @@ TEST_F(ExportLike, NeverTakesDegreesForMetresBesideAMap) {
   convert("wide.flt", "equirectangular");
   std::filesystem::copy_file(coast, folder / "coast.tif");
   refuses("coast.tif",
-          "is in metres, the archive's source in degrees; bring it to the source's reference system, \"WGS");
+          "is in metres, the archive's source in degrees; bring it to the source's reference system, EPSG:4326");
 }
 
 TEST_F(ExportLike, CountsLongitudesRoundTheBodyWhereRowsStayRows) {

@@ -224,7 +224,7 @@ TEST_F(ExportAsSource, WhatOvershootsTheSourcesOwnTypeIsMovedToItsEndsWithAWord)
 TEST_F(ExportAsSource, SamplesThatAnotherTypeDoesNotHoldAreRefusedWithARemedy) {
   write_stripes(folder / "stripes.tif", SampleType::kInt16);
   convert(folder / "stripes.tif");
-  expect_refused(run("back.png"), 2, "which uint16 does not hold; use --clamp-range, --method barycentric");
+  expect_refused(run("back.png"), 2, "which uint16 does not hold; use --raw-scale");
   EXPECT_EQ(run("back.png", {"--clamp-range"}).exit_code, 0);
   expect_refused(run("b.tif", {"--type", "u8", "--raw-scale", "0.5"}), 2, " (elevations are ");
 }

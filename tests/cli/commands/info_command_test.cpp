@@ -58,9 +58,9 @@ TEST_F(InfoCommand, SaysThatTransparentSamplesAreVoids) {
   const std::array<std::uint8_t, 16> pixels = {1, 134, 170, 255, 1, 134, 180, 255, 1, 134, 190, 255, 0, 0, 0, 0};
   sink->write_rows(std::as_bytes(std::span(pixels)));
   sink->finish();
-  const RunResult result = run_isohf({"info", folder / "clear.png", "--channel", "mapbox"});
+  const RunResult result = run_isohf({"info", folder / "clear.png", "--encoding", "mapbox"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("transparent samples, read as -1\n"));
+  EXPECT_THAT(result.out, HasSubstr("transparent samples, read as 0\n"));
 }
 
 TEST_F(InfoCommand, SaysThatTheSourcesSamplesAreKept) {

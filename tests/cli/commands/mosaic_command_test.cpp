@@ -179,10 +179,10 @@ TEST_F(MosaicCommand, MissingTilesAreReportedAndCanBeAnError) {
   std::filesystem::remove(tiles + "piece6.tif");
   const RunResult result = run_isohf({"convert", tiles, folder / "a.isohf"});
   EXPECT_EQ(result.exit_code, 0);
-  EXPECT_THAT(result.err, HasSubstr("2 of 12 tiles are missing (5,000 samples): x 501500...503000, y "));
+  EXPECT_THAT(result.err, HasSubstr("5000 samples lie in no file, the first at x 501500...504500, y "));
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   expect_error({"convert", tiles, folder / "b.isohf", "--strict"}, 1,
-               "2 of 12 tiles are missing (5,000 samples): x 501500...503000, y 5197015...5198515");
+               "5000 samples lie in no file, the first at x 501500...504500, y 5197015...5198515");
   EXPECT_FALSE(std::filesystem::exists(folder / "b.isohf"));
 }
 

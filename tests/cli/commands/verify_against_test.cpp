@@ -175,8 +175,8 @@ TEST_F(VerifyAgainst, RefusesARasterThatIsNotTheArchivesSource) {
   write_file(folder / "other.prj",
              "GEOGCS[\"NAD27\",DATUM[\"D_North_American_1927\",SPHEROID[\"Clarke_1866\",6378206.4,294.9786982]],"
              "PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]]");
-  refused("other.flt", "is in \"NAD27\", not \"WGS 84\"");
-  write_file(folder / "other.prj", "Projection UTM\nZone 31\nDatum WGS84\nUnits METERS\n");
+  refused("other.flt", "is in EPSG:4267, not EPSG:4326");
+  write_file(folder / "other.prj", "EPSG:32631");
   refused("other.flt", "is in metres, not degrees");
   // Of a thousandth of a sample nobody asks, nor from where longitudes are counted.
   write_degrees(folder / "near", kColumns, kRows, 5.000005, 44.0, 0.01, ground);

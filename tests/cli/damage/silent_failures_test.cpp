@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <sstream>
 
-#include "formats/grids/netcdf_bytes.h"
-#include "formats/io/zip_archive.h"
+#include "formats/io/packed_bytes.h"
+#include "formats/netcdf/netcdf_bytes.h"
 #include "support/run_program.h"
 #include "support/temporary_folder.h"
 
@@ -118,12 +118,12 @@ TEST_F(SilentFailures, TheValidRangeCountsWhatItRemovesAndWarnsOfNothing) {
 TEST_F(SilentFailures, AFolderHoldsRastersInZipFilesOfAnyName) {
   std::filesystem::create_directory(folder / "tiles");
   for (const std::string name : {"n44e006", "n44e007"}) {
-    std::vector<std::byte> samples(2 * 1201 * 1201);
-    for (std::size_t i = 1; i < samples.size(); i += 2) samples[i] = std::byte{static_cast<unsigned char>(i / 9000)};
+    std::string samples(2 * 1201 * 1201, '\0');
+    for (std::size_t i = 1; i < samples.size(); i += 2) samples[i] = static_cast<char>(i / 9000);
     write_file(folder / ("tiles/NASADEM_HGT_" + name + ".zip"),
-               zip_archive({{name + ".num", {}}, {name + ".hgt", samples}}, true));
+               packed({{name + ".num", "x"}, {name + ".hgt", samples}}, "zip"));
   }
-  write_file(folder / "tiles/other.zip", zip_archive({{"readme.txt", {}}}, true));
+  write_file(folder / "tiles/other.zip", packed({{"readme.txt", "x"}}, "zip"));
   EXPECT_THAT(run({"plan", "tiles"}).out, HasSubstr("mosaic of 2 files"));
 }
 
@@ -201,7 +201,7 @@ TEST_F(SilentFailures, GroundThatNoSourceOfAVrtCoversIsVoid) {
     }
   }
   vrt("Int16", "");
-  EXPECT_THAT(run({"info", "a.vrt"}).out + run({"info", "a.vrt"}).err, HasSubstr("samples become int32"));
+  EXPECT_THAT(run({"info", "a.vrt"}).out + run({"info", "a.vrt"}).err, HasSubstr("samples become float64"));
 }
 
 }  // namespace

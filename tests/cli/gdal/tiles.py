@@ -179,10 +179,9 @@ def read(isohf, folder):
             for packing in (1, 2):
                 for leaf in (None, 1, 4):
                     path = folder / f"a{packing}{leaf}.pmtiles"
-                    path.write_bytes(pmtiles(plain, 2, packing, leaf))
+                    path.write_bytes(pmtiles(plain, 2, packing, leaf, {"encoding": encoding}))
                     isohf.holds(path, plain, 9, encoding)
             (folder / "w.pmtiles").write_bytes(pmtiles(small, 4))
-            isohf.holds(folder / "w.pmtiles", small, 9, encoding)
             isohf.holds(folder / "w.pmtiles", small, 9, encoding, "--encoding", encoding)
     plain = tiles_of(HOLES, "mapbox")
     path = folder / "z.pmtiles"
@@ -191,7 +190,6 @@ def read(isohf, folder):
     for part in ("7", "10", "x", "-1", "99999999999", "8 "):
         isohf.refuses("has no zoom level", "convert", path, "-o", folder / "n.isohf", "--part", part)
     isohf.refuses("has no channels but packed", "convert", path, "-o", folder / "n.isohf", "--channel", "R")
-    # Tiles of the sea alone look like nothing; what the file says counts.
     large = tiles_of(BLOCK, "mapbox", 512)
     sea = {place: picture(packed(numpy.full((64, 64), 100000), "mapbox")[0]) for place in BLOCK}
     (folder / "sea.pmtiles").write_bytes(pmtiles(sea))
@@ -199,10 +197,10 @@ def read(isohf, folder):
     (folder / "s.pmtiles").write_bytes(pmtiles(sea, metadata={"encoding": "mapbox"}))
     check(isohf.run("convert", folder / "s.pmtiles", "-o", folder / "s.isohf", "-q").returncode == 0, "s.pmtiles: its encoding is not taken")
     (folder / "l.pmtiles").write_bytes(pmtiles(large))
-    isohf.holds(folder / "l.pmtiles", large, 9, "mapbox", side=512)
+    isohf.holds(folder / "l.pmtiles", large, 9, "mapbox", "--encoding", "mapbox", side=512)
     runs = {place: sea[BLOCK[0]] for place in [(6, x, y) for x in range(64) for y in range(64)]}
     (folder / "runs.pmtiles").write_bytes(pmtiles(runs))
-    said = json.loads(isohf.run("info", folder / "runs.pmtiles", "--channel", "mapbox", "--json").stdout)
+    said = json.loads(isohf.run("info", folder / "runs.pmtiles", "--encoding", "mapbox", "--json").stdout)
     check("4096" in json.dumps(said), f"64 x 64 tiles in one run: {said}")
 
 
@@ -212,8 +210,8 @@ def folders(isohf, folder):
         isohf.holds(folder_of(folder / ending, tiles, ending), tiles, 9, "terrarium", "--recursive", "--encoding", "terrarium")
     rim = tiles_of(BLOCK[:1], "mapbox", 258)
     folder_of(folder / "rim", rim, "png")
-    said = isohf.run("info", folder / "rim/9/266/180.png", "--channel", "mapbox").stderr
-    check("rim of their neighbours'" in said, f"a tile with a rim: {said}")
+    said = isohf.run("info", folder / "rim/9/266/180.png", "--encoding", "mapbox").stderr
+    check("rim of its neighbours'" in said, f"a tile with a rim: {said}")
 
 
 def refused(isohf, folder):

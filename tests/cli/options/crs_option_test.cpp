@@ -53,7 +53,7 @@ TEST_F(CrsOption, TakesACodeWktAProjStringAndAFile) {
 
 TEST_F(CrsOption, CompletesTheFileAndMovesNoSample) {
   // It names the ellipsoid alone.
-  write_text(folder_ / "grid.prj", "Projection UTM\nZone 11\nDatum WGS72\nUnits METERS\n");
+  write_text(folder_ / "grid.prj", "+proj=utm +zone=11 +ellps=WGS72");
   ASSERT_EQ(run_isohf({"convert", grid_, archive_, "--quiet"}).err, "");
   const json as_filed = crs();
   for (const char* const other : {"EPSG:32611", "EPSG:32212", "EPSG:4322"}) {

@@ -1,4 +1,4 @@
-#include "formats/georeference/files_beside.h"
+#include "formats/georeference/sidecars.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -42,7 +42,7 @@ class AuxiliaryMetadata : public ::testing::Test {
   void beside(const std::string& text) { write_file(info_.path + ".aux.xml", text); }
   Error error_with(const std::string& text) {
     beside(text);
-    return error_of([&] { read_auxiliary_metadata(info_, 1); });
+    return error_of([&] { read_sidecars(info_, 1); });
   }
 
   TemporaryFolder folder_;
@@ -50,14 +50,14 @@ class AuxiliaryMetadata : public ::testing::Test {
 };
 
 TEST_F(AuxiliaryMetadata, IsNoneWithoutTheFile) {
-  read_auxiliary_metadata(info_, 1);
+  read_sidecars(info_, 1);
   EXPECT_FALSE(info_.georeference.has_origin);
   EXPECT_TRUE(info_.void_values.empty());
 }
 
 TEST_F(AuxiliaryMetadata, PlacesTheMiddleOfTheFirstPixel) {
   beside(kAll);
-  read_auxiliary_metadata(info_, 0);
+  read_sidecars(info_, 0);
   const Georeference& place = info_.georeference;
   EXPECT_THAT(grid_of(place), ElementsAre(10.25, 49.875, 0.5, 0.25));
   EXPECT_EQ(place.registration, Registration::kPoint);
@@ -68,7 +68,7 @@ TEST_F(AuxiliaryMetadata, PlacesTheMiddleOfTheFirstPixel) {
 
 TEST_F(AuxiliaryMetadata, SaysWhatABandsNumbersMean) {
   beside(kAll);
-  read_auxiliary_metadata(info_, 2);
+  read_sidecars(info_, 2);
   EXPECT_EQ(info_.void_values, std::vector<double>{-32768.0});
   EXPECT_EQ(info_.z_scale, 0.1);
   EXPECT_EQ(info_.z_offset, 100.0);
@@ -85,7 +85,7 @@ TEST_F(AuxiliaryMetadata, LeavesWhatTheRasterSaysItself) {
   info_.georeference.origin_x = 3.0;
   info_.georeference.unit = HorizontalUnit::kMetre;
   info_.georeference.registration = Registration::kArea;
-  read_auxiliary_metadata(info_, 2);
+  read_sidecars(info_, 2);
   EXPECT_EQ(info_.void_values, std::vector<double>{5.0});
   EXPECT_EQ(info_.z_scale, 2.0);
   EXPECT_EQ(info_.z_offset, 0.0);
@@ -108,12 +108,12 @@ TEST_F(AuxiliaryMetadata, SaysThatBytesHaveSigns) {
       R"(<PAMDataset><PAMRasterBand band="1"><Metadata domain="IMAGE_STRUCTURE"><MDI key="PIXELTYPE">SIGNEDBYTE</MDI>)"
       R"(</Metadata><NoDataValue>-5</NoDataValue></PAMRasterBand></PAMDataset>)");
   info_.sample_type = SampleType::kUint8;
-  read_auxiliary_metadata(info_, 1);
+  read_sidecars(info_, 1);
   EXPECT_EQ(info_.sample_type, SampleType::kInt8);
   EXPECT_EQ(info_.void_values, std::vector<double>{-5.0});
   info_.sample_type = SampleType::kUint8;
   info_.void_values = {251.0};  // as the raster had it
-  read_auxiliary_metadata(info_, 1);
+  read_sidecars(info_, 1);
   EXPECT_EQ(info_.void_values, std::vector<double>{-5.0});
   EXPECT_TRUE(info_.warnings.empty());
 }
@@ -121,7 +121,7 @@ TEST_F(AuxiliaryMetadata, SaysThatBytesHaveSigns) {
 TEST_F(AuxiliaryMetadata, WhatCannotBeUsedIsLost) {
   beside(R"(<PAMDataset><PAMRasterBand band="1"><NoDataValue>1e9</NoDataValue><Scale>0</Scale><Offset>much</Offset>)"
          R"(</PAMRasterBand></PAMDataset>)");
-  read_auxiliary_metadata(info_, 1);
+  read_sidecars(info_, 1);
   ASSERT_EQ(info_.warnings.size(), 3U);
   for (const Warning& warning : info_.warnings) EXPECT_EQ(warning.kind, Warning::Kind::kLoss) << warning;
   EXPECT_EQ(info_.z_scale, 1.0);
@@ -137,8 +137,8 @@ TEST_F(AuxiliaryMetadata, NamesTheBandsThatHaveNoName) {
 TEST_F(AuxiliaryMetadata, SaysWhatIsWrongInOneLine) {
   const std::string path = info_.path + ".aux.xml";
   EXPECT_EQ(error_with("<PAMDataset>\n<SRS>x</PAMDataset>").what(),
-            path + ": line 2: mismatched tag; remove the file or have GDAL write it anew");
-  EXPECT_THAT(error_with("").what(), HasSubstr("no element found"));
+            path + ": byte 21: Start-end tags mismatch; remove the file or have GDAL write it anew");
+  EXPECT_THAT(error_with("").what(), HasSubstr("No document element found"));
   Error error = error_with("<PAMDataset><GeoTransform>1, 2, 0, 4, 0</GeoTransform></PAMDataset>");
   EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
   EXPECT_EQ(error.what(), path + ": GeoTransform is \"1, 2, 0, 4, 0\", must be six numbers");

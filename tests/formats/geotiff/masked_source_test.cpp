@@ -18,7 +18,6 @@
 namespace isohf::test {
 namespace {
 
-using testing::ElementsAre;
 using testing::HasSubstr;
 
 template <typename T>
@@ -42,32 +41,28 @@ std::vector<float> heights(HeightSource& source, const Window& window) {
   return out;
 }
 
-TEST(MaskedSource, IntegersWithoutAVoidWidenAndSaySo) {
-  const auto source = mask_transparent(ramp<std::int16_t>(SampleType::kInt16, 4, 3), diagonal(4, 3));
-  EXPECT_EQ(source->info().sample_type, SampleType::kInt32);
-  ASSERT_EQ(source->info().warnings.size(), 1U);
-  EXPECT_THAT(source->info().warnings[0], HasSubstr("int16 has no number to spare for transparent samples"));
-  const std::vector<float> found = heights(*source, {1, 0, 2, 3});
-  EXPECT_THAT(std::vector(found.begin(), found.begin() + 2), ElementsAre(1.0F, 2.0F));
-  EXPECT_TRUE(std::isnan(found[2]));
-  EXPECT_EQ(found[3], 12.0F);
-  EXPECT_EQ(found[4], 21.0F);
-  EXPECT_TRUE(std::isnan(found[5]));
-}
-
-TEST(MaskedSource, TypesWithAVoidStay) {
+TEST(MaskedSource, TransparentSamplesAreVoidInATypeThatHasAVoid) {
   auto declared = ramp<std::int16_t>(SampleType::kInt16, 4, 3);
   declared->mutable_info().void_values = {-5.0};
   const auto integers = mask_transparent(std::move(declared), diagonal(4, 3));
-  EXPECT_EQ(integers->info().sample_type, SampleType::kInt16);
   const auto floats = mask_transparent(ramp<float>(SampleType::kFloat32, 4, 3), diagonal(4, 3));
+  const auto widened = mask_transparent(ramp<std::int16_t>(SampleType::kInt16, 4, 3), diagonal(4, 3));
+  EXPECT_EQ(integers->info().sample_type, SampleType::kInt16);
   EXPECT_EQ(floats->info().sample_type, SampleType::kFloat32);
-  for (HeightSource* source : {integers.get(), floats.get()}) {
-    EXPECT_TRUE(source->info().warnings.empty());
-    const std::vector<float> found = heights(*source, {0, 0, 4, 3});
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      const auto height = static_cast<float>(10 * (i / 4) + i % 4);
-      EXPECT_TRUE(i % 4 == i / 4 ? std::isnan(found[i]) : found[i] == height) << i;
+  EXPECT_EQ(widened->info().sample_type, SampleType::kInt32);
+  ASSERT_EQ(widened->info().warnings.size(), 1U);
+  EXPECT_THAT(widened->info().warnings[0], HasSubstr("int16 has no number to spare for transparent samples"));
+  for (HeightSource* source : {integers.get(), floats.get(), widened.get()}) {
+    EXPECT_TRUE(source == widened.get() || source->info().warnings.empty());
+    for (const std::int64_t left : {0, 1}) {
+      const std::int64_t columns = 3;
+      const std::vector<float> found = heights(*source, {left, 0, columns, 3});
+      for (std::int64_t i = 0; i < 3 * columns; ++i) {
+        const std::int64_t row = i / columns;
+        const std::int64_t column = left + i % columns;
+        const float height = found[static_cast<std::size_t>(i)];
+        EXPECT_TRUE(column == row ? std::isnan(height) : height == static_cast<float>(10 * row + column)) << i;
+      }
     }
   }
 }
@@ -76,11 +71,10 @@ TEST(MaskedSource, LargeWindowsAreReadInParts) {
   constexpr std::int64_t kSide = 700;  // more samples than are read at once
   const auto source = mask_transparent(ramp<std::uint16_t>(SampleType::kUint16, kSide, kSide), diagonal(kSide, kSide));
   const std::vector<float> found = heights(*source, {0, 0, kSide, kSide});
-  for (std::int64_t r = 0; r < kSide; ++r) {
-    for (std::int64_t c = 0; c < kSide; ++c) {
-      const float height = found[static_cast<std::size_t>(r * kSide + c)];
-      ASSERT_TRUE(c == r ? std::isnan(height) : height == static_cast<float>(10 * r + c)) << c << " " << r;
-    }
+  for (std::int64_t i = 0; i < kSide * kSide; ++i) {
+    const float height = found[static_cast<std::size_t>(i)];
+    const bool is_void = i / kSide == i % kSide;
+    ASSERT_TRUE(is_void ? std::isnan(height) : height == static_cast<float>(10 * (i / kSide) + i % kSide)) << i;
   }
 }
 
@@ -103,8 +97,8 @@ TEST(MaskedSource, TiffMasksOfBitsAndBytesAreTurnedWithTheirImage) {
       TiffBytes tiff;
       tiff.image(11, 3, 8, 1, 3).block(samples).next(mask);
       if (from_south) tiff.shorts(274, {4});
-      const auto source = open_tiff(tiff.write(folder / "a.tif"), {});
-      EXPECT_EQ(source->info().sample_type, SampleType::kInt16);
+      const auto source = kTiffFormat.open(tiff.write(folder / "a.tif"), {});
+      EXPECT_EQ(source->info().sample_type, SampleType::kInt32);
       // From a column that is not the first of its byte.
       const std::vector<float> found = heights(*source, {3, 0, 8, 3});
       for (int r = 0; r < 3; ++r) {
@@ -129,7 +123,7 @@ TEST(MaskedSource, ADirectoryThatIsDamagedIsWarnedOf) {
   tiff.image(4, 2, 8, 1, 2).block("abcdefgh");
   const std::size_t alone = tiff.build().size();
   write_file(folder / "a.tif", tiff.next(mask).build().substr(0, alone + 10));
-  const auto source = open_tiff(folder / "a.tif", {});
+  const auto source = kTiffFormat.open(folder / "a.tif", {});
   ASSERT_EQ(source->info().warnings.size(), 1U);
   EXPECT_THAT(source->info().warnings[0], HasSubstr("a directory behind the image is damaged"));
 }

@@ -142,7 +142,7 @@ class TiffLayouts : public testing::Test {
     for (int channel = 0; channel < s.samples; ++channel) {
       OpenOptions options;
       if (s.samples > 1) options.channel = std::to_string(channel);
-      const auto source = open_tiff(path(), options);
+      const auto source = kTiffFormat.open(path(), options);
       ASSERT_EQ(source->info().sample_type, s.type);
       ASSERT_TRUE(source->info().warnings.empty()) << s << ": " << source->info().warnings.front();
       expect_window(*source, s, channel, {0, 0, s.width, s.height});
@@ -192,31 +192,16 @@ TEST_F(TiffLayouts, EverySampleTypeComesThroughEveryCompression) {
   EXPECT_GT(written, 500);
 }
 
-TEST_F(TiffLayouts, EveryStripHeightAndEdgeComesThrough) {
+TEST_F(TiffLayouts, EveryEdgeComesThrough) {
   for (const int compression : {COMPRESSION_NONE, COMPRESSION_LZW}) {
-    for (std::uint32_t rows = 1; rows <= 6; ++rows) {
-      for (std::int64_t height = 1; height <= 7; ++height) {
-        for (const std::int64_t width : {1, 2, 17}) {
-          Storage s{.width = width,
-                    .height = height,
-                    .rows_per_strip = rows == 6 ? UINT32_MAX : rows,
-                    .compression = compression};
+    for (const std::int64_t width : {1, 15, 16, 17, 33}) {
+      for (const std::int64_t height : {1, 2, 5, 15, 16, 17, 33}) {
+        for (const std::uint32_t rows : {0U, 1U, 2U, 5U, 16U, UINT32_MAX}) {
+          Storage s{.type = SampleType::kFloat32, .width = width, .height = height, .compression = compression};
+          rows == 0 ? s.tile = 16 : s.rows_per_strip = rows;
           expect_through(s);
           if (HasFatalFailure()) return;
         }
-      }
-    }
-  }
-}
-
-TEST_F(TiffLayouts, EveryTileEdgeComesThrough) {
-  for (const int compression : {COMPRESSION_NONE, COMPRESSION_LZW}) {
-    for (const std::int64_t width : {1, 15, 16, 17, 32, 33}) {
-      for (const std::int64_t height : {1, 15, 16, 17, 32, 33}) {
-        Storage s{
-            .type = SampleType::kFloat32, .width = width, .height = height, .tile = 16, .compression = compression};
-        expect_through(s);
-        if (HasFatalFailure()) return;
       }
     }
   }
@@ -230,7 +215,7 @@ TEST_F(TiffLayouts, WindowsInAnyOrderEqualTheWhole) {
         Storage s{
             .samples = samples, .separate = separate, .tile = tile, .compression = compression, .big_endian = true};
         ASSERT_TRUE(write_tiff(path(), s));
-        const auto source = open_tiff(path(), test::of_channel(std::to_string(samples - 1)));
+        const auto source = kTiffFormat.open(path(), test::of_channel(std::to_string(samples - 1)));
         for (int i = 0; i < 300; ++i) {
           const auto pick = [&](std::int64_t n) {
             return static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(n));
@@ -245,17 +230,16 @@ TEST_F(TiffLayouts, WindowsInAnyOrderEqualTheWhole) {
   }
 }
 
-/// Compressed strips of more than 16 MiB are decoded row by row.
-TEST_F(TiffLayouts, LargeCompressedStripsComeThroughInAnyOrder) {
-  for (const auto& [rows_per_strip, samples] : {std::pair(3000U, 1), std::pair(2100U, 1), std::pair(3000U, 2)}) {
-    Storage s{.width = 4096 / samples,
-              .height = 2200,
-              .samples = samples,
-              .rows_per_strip = rows_per_strip,
-              .compression = COMPRESSION_LZW};
+TEST_F(TiffLayouts, LargeBlocksComeThroughInAnyOrder) {
+  for (const auto& [rows_per_strip, samples, compression] :
+       {std::tuple(3000U, 1, COMPRESSION_LZW), std::tuple(1100U, 2, COMPRESSION_LZW),
+        std::tuple(3000U, 2, COMPRESSION_NONE), std::tuple(0U, 1, COMPRESSION_LZW)}) {
+    Storage s{.width = 4096 / samples, .height = 2200, .samples = samples, .compression = compression};
+    rows_per_strip == 0 ? s.tile = 256 : s.rows_per_strip = rows_per_strip;
     ASSERT_TRUE(write_tiff(path(), s));
-    const auto source = open_tiff(path(), test::of_channel(std::to_string(samples - 1)));
-    EXPECT_LT(source->info().block_height, 300);
+    const auto source = kTiffFormat.open(path(), test::of_channel(std::to_string(samples - 1)));
+    // libtiff chops one plain strip.
+    EXPECT_EQ(source->info().block_height == 1, compression == COMPRESSION_NONE);
     for (std::int64_t row = 0; row < s.height; row += 450) {
       // Neighbouring bands overlap, as a resampler's do.
       const std::int64_t top = std::max<std::int64_t>(0, row - 7);
@@ -263,29 +247,9 @@ TEST_F(TiffLayouts, LargeCompressedStripsComeThroughInAnyOrder) {
     }
     expect_window(*source, s, samples - 1, {s.width - 96, 2090, 96, 30});
     expect_window(*source, s, samples - 1, {5, 3, 7, 1});
-    expect_window(*source, s, samples - 1, {0, 2199, s.width, 1});
+    expect_window(*source, s, samples - 1, {0, 0, s.width, s.height});
     if (HasFatalFailure()) return;
   }
-}
-
-TEST_F(TiffLayouts, LargePlainStripsComeThrough) {
-  Storage s{.width = 4096, .height = 2500, .samples = 2, .rows_per_strip = 2500};
-  ASSERT_TRUE(write_tiff(path(), s));
-  const auto source = open_tiff(path(), test::of_channel("1"));
-  EXPECT_EQ(source->info().block_height, 1);
-  expect_window(*source, s, 1, {0, 100, s.width, 1000});
-  expect_window(*source, s, 1, {17, 2400, 3000, 100});
-}
-
-TEST_F(TiffLayouts, ManyTilesComeThroughTheCache) {
-  Storage s{.type = SampleType::kFloat64, .width = 3000, .height = 1100, .tile = 256, .compression = COMPRESSION_LZW};
-  ASSERT_TRUE(write_tiff(path(), s));
-  const auto source = open_tiff(path(), {});
-  for (std::int64_t row = 0; row < s.height; row += 100) {
-    expect_window(*source, s, 0, {0, row, s.width, std::min<std::int64_t>(130, s.height - row)});
-  }
-  expect_window(*source, s, 0, {0, 0, s.width, s.height});
-  expect_window(*source, s, 0, {2000, 0, 1000, 300});
 }
 
 TEST_F(TiffLayouts, LossyJpegIsReadAsItDecodes) {
@@ -303,7 +267,7 @@ TEST_F(TiffLayouts, LossyJpegIsReadAsItDecodes) {
     TIFFWriteEncodedStrip(tif, i, strip.data(), static_cast<tmsize_t>(strip.size()));
   }
   TIFFClose(tif);
-  const auto source = open_tiff(path(), {});
+  const auto source = kTiffFormat.open(path(), {});
   std::vector<std::byte> raw(64 * 64);
   source->read_window({0, 0, 64, 64}, raw);
   for (int i = 0; i < 64 * 64; ++i) {

@@ -36,7 +36,7 @@ TiffBytes small() {
 class TiffSource : public testing::Test {
  protected:
   std::unique_ptr<HeightSource> open(const TiffBytes& tiff, const OpenOptions& options = {}) const {
-    return open_tiff(tiff.write(folder_ / "a.tif"), options);
+    return kTiffFormat.open(tiff.write(folder_ / "a.tif"), options);
   }
 
   SourceInfo info_of(const TiffBytes& tiff, const OpenOptions& options = {}) const {
@@ -60,12 +60,12 @@ TEST_F(TiffSource, RecognisesBothByteOrdersAndBigTiff) {
   for (const bool big_endian : {false, true}) {
     for (const bool big_tiff : {false, true}) {
       const std::string file = TiffBytes(big_endian, big_tiff).build();
-      EXPECT_TRUE(looks_like_tiff(std::as_bytes(std::span(file))));
-      EXPECT_FALSE(looks_like_tiff(std::as_bytes(std::span(file)).first(3)));
+      EXPECT_TRUE(kTiffFormat.recognises(std::as_bytes(std::span(file))));
+      EXPECT_FALSE(kTiffFormat.recognises(std::as_bytes(std::span(file)).first(3)));
     }
   }
   const std::string other = "II*x";
-  EXPECT_FALSE(looks_like_tiff(std::as_bytes(std::span(other))));
+  EXPECT_FALSE(kTiffFormat.recognises(std::as_bytes(std::span(other))));
 }
 
 TEST_F(TiffSource, KnowsNothingOfAPlainTiff) {
@@ -113,7 +113,8 @@ TEST_F(TiffSource, PlacesBySidecarFilesWhereTheTagsDoNot) {
   test::write_file(folder_ / "a.tfw", "30\n0\n0\n-20\n1000.5\n2000.5\n");
   test::write_file(folder_ / "a.prj",
                    "PROJCS[\"somewhere\",GEOGCS[\"S\",DATUM[\"S\",SPHEROID[\"S\",6378137,298]],"
-                   "PRIMEM[\"Greenwich\",0],UNIT[\"Degree\",0.0174532925199433]],UNIT[\"Foot\",0.3048]]\n");
+                   "PRIMEM[\"Greenwich\",0],UNIT[\"Degree\",0.0174532925199433]],PROJECTION[\"Mercator_1SP\"],"
+                   "PARAMETER[\"central_meridian\",0],PARAMETER[\"scale_factor\",1],UNIT[\"Foot\",0.3048]]\n");
   SourceInfo info = info_of(small());
   EXPECT_THAT(test::grid_of(info.georeference), ::testing::ElementsAre(1000.5, 2000.5, 30, 20));
   EXPECT_EQ(info.georeference.system.name, "somewhere");
@@ -156,6 +157,24 @@ TEST_F(TiffSource, TakesVoidsAndScaleFromGdalTags) {
   EXPECT_EQ(info_of(tiff, options).void_values, Values{5});
 }
 
+TEST_F(TiffSource, KnowsUnitsThatAreLengths) {
+  const auto with = [&](const std::string& unit) {
+    return info_of(small().ascii(42112, "<GDALMetadata><Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">" + unit +
+                                            "</Item></GDALMetadata>"));
+  };
+  EXPECT_EQ(with("dm").metres_per_vertical_unit, 0.1);
+  EXPECT_EQ(with("1/10 m").metres_per_vertical_unit, 0.1);
+  EXPECT_EQ(with("Clarke&apos;s foot").vertical_unit, "Clarke's foot");
+  // GDAL escapes twice.
+  for (const char* unknown : {"mGal", "a &amp;lt; b", "a &lt; b"}) {
+    const SourceInfo info = with(unknown);
+    EXPECT_TRUE(info.vertical_unit.empty());
+    ASSERT_EQ(info.warnings.size(), 1U);
+    EXPECT_EQ(info.warnings[0].kind, Warning::Kind::kLoss);
+    EXPECT_THAT(info.warnings[0], testing::HasSubstr(std::string(unknown) == "mGal" ? "\"mGal\"" : "\"a < b\""));
+  }
+}
+
 TEST_F(TiffSource, TakesTheVoidValueBesideBeforeItsOwn) {
   test::write_file(folder_ / "a.tif.aux.xml",
                    "<PAMDataset><PAMRasterBand band=\"1\"><NoDataValue>4</NoDataValue></PAMRasterBand></PAMDataset>");
@@ -173,15 +192,35 @@ TEST_F(TiffSource, WarnsOfVoidsThatCannotBe) {
 }
 
 TEST_F(TiffSource, FindsFloatVoidsByTheirDecimalTexts) {
-  constexpr float kLowest = std::numeric_limits<float>::lowest();
-  TiffBytes tiff;
-  tiff.image(2, 1, 32, 3, 1).block(bytes_of<float>({kLowest, 1.0F}));
-  for (const char* text : {"-3.4028234663852886e+38", "-3.40282346638529e+38", "-3.402823e+38", "-3.4028235e+38"}) {
-    const SourceInfo info = info_of(tiff.ascii(42113, text));
-    ASSERT_EQ(info.void_values.size(), 1U) << text;
-    const bool full = std::string(text) != "-3.402823e+38";
-    EXPECT_EQ(info.void_values[0] == static_cast<double>(kLowest), full) << text;
+  constexpr double kLowest = std::numeric_limits<float>::lowest();
+  struct Row {
+    const char* text;
+    int bits;
+    double stored;
+  };
+  for (const Row& row :
+       {Row{"-3.4028234663852886e+38", 32, kLowest}, Row{"-3.40282346638529e+38", 32, kLowest},
+        Row{"-3.402823e+38", 32, kLowest}, Row{"-3.4028235e+38", 32, kLowest}, Row{"-3.40282e+38", 32, kLowest},
+        Row{"1.701412e+38", 32, 0x1p127}, Row{"-2.147484e+09", 32, -0x1p31}, Row{"-9999", 32, -9999.0},
+        Row{"1e20", 32, float{1e20F}}, Row{"-32767.99", 32, float{-32767.99F}},
+        Row{"-1.79769313486232e+308", 64, std::numeric_limits<double>::lowest()},
+        Row{"-3.4028234663852886e+38", 64, kLowest}}) {
+    TiffBytes tiff;
+    tiff.image(2, 1, row.bits, 3, 1);
+    if (row.bits == 32) {
+      tiff.block(bytes_of<float>({static_cast<float>(row.stored), 1.0F}));
+    } else {
+      tiff.block(bytes_of<double>({row.stored, 1.0}));
+    }
+    const auto source = open(tiff.ascii(42113, row.text));
+    EXPECT_TRUE(source->info().warnings.empty());
+    std::vector<float> heights(2);
+    heights_from_samples(source->info(), 0.0, test::read_whole(*source), heights);
+    EXPECT_TRUE(std::isnan(heights[0])) << row.text;
+    EXPECT_EQ(heights[1], 1.0F);
   }
+  TiffBytes tiff;
+  tiff.image(2, 1, 32, 3, 1).block(bytes_of<float>({1.0F, 2.0F}));
   EXPECT_TRUE(std::isnan(info_of(tiff.ascii(42113, "nan")).void_values.at(0)));
 }
 
@@ -232,20 +271,73 @@ TEST_F(TiffSource, PicksTheChannelThatIsDescribedAsElevations) {
   };
   EXPECT_EQ(values(described("slope", "elevation")), (Values{20, 21}));
   EXPECT_EQ(info_of(described("slope", "elevation")).warnings,
-            std::vector<Warning>{"there are 3 channels; channel elevation is read"});
+            std::vector<Warning>{"there are 3 bands; channel elevation is read"});
   EXPECT_EQ(values(described("Z", "DEM [m]")), (Values{20, 21}));
   EXPECT_EQ(values(described("slope", "z")), (Values{20, 21}));
   EXPECT_EQ(values(described("Height", "elevation")), (Values{10, 11}));
   EXPECT_EQ(values(described("slope", "elevation error")), (Values{10, 11}));
   EXPECT_EQ(values(described("slope", "elevation"), test::of_channel("0")), (Values{10, 11}));
+  for (const char* stored : {"Rock &amp; Ice &lt;m&gt;", "Rock &amp;amp; Ice &amp;lt;m&amp;gt;"}) {
+    EXPECT_EQ(values(described("slope", stored), test::of_channel("Rock & Ice <m>")), (Values{20, 21}));
+  }
+}
+
+/// Pixels of `channels` samples; of four the last one is of kind `extra` (TIFF's ExtraSamples).
+template <typename T>
+TiffBytes colours(std::size_t channels, const std::vector<T>& samples, std::uint64_t extra = 2) {
+  TiffBytes tiff;
+  const auto all = [&](std::uint64_t value) { return std::vector<std::uint64_t>(channels, value); };
+  tiff.image(samples.size() / channels, 1, 8 * sizeof(T), 1, 1).shorts(262, {2}).shorts(277, {channels});
+  tiff.shorts(258, all(8 * sizeof(T))).shorts(339, all(1)).block(bytes_of<T>(samples));
+  if (channels == 4) tiff.shorts(338, {extra});
+  return tiff;
 }
 
 TEST_F(TiffSource, RefusesAColourPictureUnlessAChannelIsNamed) {
-  TiffBytes tiff;
-  tiff.image(1, 1, 8, 1, 1).shorts(262, {2}).shorts(277, {3}).shorts(258, {8, 8, 8}).shorts(339, {1, 1, 1});
-  tiff.block("abc");
+  const TiffBytes tiff = colours<std::uint8_t>(3, {'a', 'b', 'c'});
   EXPECT_EQ(code_of(tiff), ErrorCode::kUnsupported);
   EXPECT_EQ(values(tiff, test::of_channel("G")), (Values{'b'}));
+}
+
+TEST_F(TiffSource, ReadsEqualColoursAsGreyWithoutWhatIsTransparent) {
+  EXPECT_EQ(values(colours<std::uint8_t>(3, {7, 7, 7, 9, 9, 9})), (Values{7, 9}));
+  for (const std::uint64_t extra : {1U, 2U, 0U}) {  // associated and unassociated opacity, and no statement
+    const TiffBytes tiff =
+        colours<std::uint16_t>(4, {300, 300, 300, 65535, 0, 0, 0, 0, 1800, 1800, 1800, 65535}, extra);
+    const auto source = open(tiff);
+    std::vector<float> heights(3);
+    heights_from_samples(source->info(), 0.0, test::read_whole(*source), heights);
+    EXPECT_EQ(heights[0], 300.0F);
+    EXPECT_EQ(std::isnan(heights[1]), extra != 0) << extra;
+    EXPECT_EQ(heights[2], 1800.0F);
+    EXPECT_EQ(values(tiff, test::of_channel("R")), (Values{300, 0, 1800}));
+  }
+}
+
+TEST_F(TiffSource, ReadsElevationsThatArePackedIntoColours) {
+  const std::vector<std::uint8_t> bytes = {1, 134, 160, 1, 134, 170};  // 100000 and 100010: 0 and 1 m
+  OpenOptions options;
+  options.encoding = "mapbox";
+  TiffBytes tiff = colours<std::uint8_t>(3, bytes);
+  EXPECT_EQ(values(tiff, options), (Values{100000, 100010}));
+  EXPECT_EQ(info_of(tiff, options).z_offset, -10000.0);
+  // Each colour in a plane of its own.
+  TiffBytes planes;
+  planes.image(2, 1, 8, 1, 1).shorts(262, {2}).shorts(277, {3}).shorts(258, {8, 8, 8}).shorts(339, {1, 1, 1});
+  planes.shorts(284, {2}).block(std::string("\x01\x01")).block(std::string("\x86\x86")).block(std::string("\xa0\xaa"));
+  EXPECT_EQ(values(planes, options), (Values{100000, 100010}));
+  EXPECT_EQ(code_of(colours<std::uint16_t>(3, {1, 2, 3}), options), ErrorCode::kInvalidArgument);
+}
+
+TEST_F(TiffSource, ReadsElevationsWithAPaletteIfAChannelIsNamed) {
+  for (const int bits : {8, 16}) {
+    TiffBytes tiff;
+    tiff.image(2, 1, bits, 1, 1).shorts(262, {3}).shorts(320, std::vector<std::uint64_t>(std::size_t{3} << bits, 1));
+    tiff.block(bits == 8 ? bytes_of<std::uint8_t>({0, 250}) : bytes_of<std::uint16_t>({0, 250}));
+    EXPECT_EQ(test::error_of([&] { (void)info_of(tiff); }).code(), ErrorCode::kUnsupported);
+    EXPECT_THAT(test::error_of([&] { (void)info_of(tiff); }).what(), testing::HasSubstr("`channel` 0"));
+    EXPECT_EQ(values(tiff, test::of_channel("0")), (Values{0, 250}));
+  }
 }
 
 TEST_F(TiffSource, ReadsMinIsWhiteAsHeights) {

@@ -1,5 +1,6 @@
 #include "formats/readers.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,7 +18,9 @@
 namespace isohf::test {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::Not;
 
 OpenOptions raw(const std::string& layout) {
@@ -56,30 +59,43 @@ TEST(RawLayout, IsReadFromItsText) {
 
 using RawSource = InFolder;
 
-TEST_F(RawSource, ReadsEveryTypeInBothByteOrders) {
-  constexpr std::array<std::pair<const char*, SampleType>, 8> kTypes = {{{"u8", SampleType::kUint8},
-                                                                         {"i8", SampleType::kInt8},
-                                                                         {"u16", SampleType::kUint16},
-                                                                         {"i16", SampleType::kInt16},
-                                                                         {"u32", SampleType::kUint32},
-                                                                         {"i32", SampleType::kInt32},
-                                                                         {"f32", SampleType::kFloat32},
-                                                                         {"f64", SampleType::kFloat64}}};
-  for (const auto& [name, type] : kTypes) {
+/// The same samples with and without a header.
+TEST_F(RawSource, EveryTypeIsReadInBothByteOrdersAsWithAHeader) {
+  using enum SampleType;
+  for (const SampleType type : {kUint8, kInt8, kUint16, kInt16, kUint32, kInt32, kFloat32, kFloat64}) {
     const std::size_t size = size_bytes(type);
-    for (const std::string order : {"le", "be"}) {
-      const std::string path = write(folder, "samples", 15 * size);
-      auto wanted = read_file(path);
-      if (order == "be") {
-        for (std::size_t i = 0; i < wanted.size(); i += size) {
-          std::reverse(wanted.begin() + static_cast<std::ptrdiff_t>(i),
-                       wanted.begin() + static_cast<std::ptrdiff_t>(i + size));
-        }
+    for (const bool is_big : {false, true}) {
+      const std::string path = write(folder, "samples", 20 * size);
+      const std::string stored = read_file(path);
+      std::string wanted = stored;
+      for (std::size_t at = 0; is_big && at < wanted.size(); at += size) {
+        std::reverse(wanted.data() + at, wanted.data() + at + size);
       }
-      const auto source = open_raster(path, raw(std::string("5x3:") + name + (size == 1 ? "" : order)));
-      EXPECT_EQ(source->info().sample_type, type);
-      SCOPED_TRACE(name + order);
-      expect_every_window(*source, std::as_bytes(std::span(wanted)));
+      const auto expect = [&](const std::string& name, const OpenOptions& options) {
+        SCOPED_TRACE(name + to_string(type));
+        const auto source = open_raster(folder / name, options);
+        EXPECT_EQ(source->info().sample_type, type);
+        EXPECT_TRUE(source->info().warnings.empty());
+        expect_every_window(*source, std::as_bytes(std::span(wanted)));
+      };
+      const bool is_unsigned = to_string(type).starts_with("u");
+      const char kind = is_floating(type) ? 'f' : is_unsigned ? 'u' : 'i';
+      const char* const order = size == 1 ? "" : is_big ? "be" : "le";
+      expect("samples", raw(fmt::format("5x4:{}{}{}", kind, 8 * size, order)));
+      for (const char* layout : {"bil", "bip", "bsq"}) {  // with padded rows behind seven other bytes
+        std::string padded = "0123456";
+        for (std::size_t row = 0; row < 4; ++row) padded += stored.substr(row * 5 * size, 5 * size) + "...";
+        write_file(folder / (std::string("a.") + layout), padded);
+        write_file(folder / "a.hdr",
+                   fmt::format("byteorder {}\r\nlayout {}\r\nnrows 4\r\nncols 5\r\nnbands 1\r\nnbits {}\r\n"
+                               "pixeltype {}\r\nskipbytes 7\r\nbandrowbytes {}\r\ntotalrowbytes {}\r\n",
+                               is_big ? "M" : "I", layout, 8 * size,
+                               is_floating(type) ? "FLOAT"
+                               : is_unsigned     ? "UNSIGNEDINT"
+                                                 : "signedint",
+                               5 * size + 3, 5 * size + 3));
+        expect(std::string("a.") + layout, {});
+      }
     }
   }
 }
@@ -103,18 +119,14 @@ TEST_F(RawSource, SaysWhenTheOtherByteOrderIsFarSmoother) {
   }
   const auto warnings = [&](const std::string& bytes, const char* layout) {
     write_file(folder / "a.r16", bytes);
-    OpenOptions options;
-    options.raw = raw_layout_from_string(layout);
-    return open_raster(folder / "a.r16", options)->info().warnings;
+    return open_raster(folder / "a.r16", raw(layout))->info().warnings;
   };
-  EXPECT_TRUE(warnings(hills, "64x64:u16le").empty());
-  ASSERT_EQ(warnings(hills, "64x64:u16be").size(), 1U);
-  EXPECT_THAT(warnings(hills, "64x64:u16be").front(), HasSubstr("perhaps the samples are `raw` 64x64:u16le"));
-  EXPECT_THAT(warnings(hills, "64x64:i16be").front(), HasSubstr("64x64:i16le"));
-  for (const char* layout : {"64x64:u16le", "64x64:u16be"}) {
-    EXPECT_TRUE(warnings(noise, layout).empty());
-    EXPECT_TRUE(warnings(terraces, layout).empty()) << "one byte says it all in either order";
-    EXPECT_TRUE(warnings(std::string(8192, '\7'), layout).empty());
+  EXPECT_THAT(warnings(hills, "64x64:u16be"), ElementsAre(HasSubstr("perhaps the samples are `raw` 64x64:u16le")));
+  EXPECT_THAT(warnings(hills, "64x64:i16be"), ElementsAre(HasSubstr("64x64:i16le")));
+  EXPECT_THAT(warnings(hills, "64x64:u16le"), IsEmpty());
+  for (const std::string& either : {noise, terraces, std::string(8192, '\7')}) {
+    EXPECT_THAT(warnings(either, "64x64:u16le"), IsEmpty());
+    EXPECT_THAT(warnings(either, "64x64:u16be"), IsEmpty());
   }
 }
 
@@ -133,18 +145,18 @@ TEST_F(RawSource, WantsExactlyTheBytesOfItsLayout) {
 }
 
 TEST_F(RawSource, AsksForALayoutByName) {
-  const auto what = [&](const std::string& name, std::size_t bytes) {
+  const std::tuple<const char*, std::size_t, const char*> rows[] = {{"a.r8", 9, "`raw` 3x3:u8)"},
+                                                                    {"a.R16", 18, "`raw` 3x3:u16le)"},
+                                                                    {"a.f32", 36, "`raw` 3x3:f32le)"},
+                                                                    {"a.f64", 72, "`raw` 3x3:f64le)"},
+                                                                    {"a.raw", 18, "`raw` 3x3:u16le)"},
+                                                                    {"a.raw", 9, "`raw` 3x3:u8)"},
+                                                                    {"a.r16", 20, "as in `raw` 200x300:u16le"}};
+  for (const auto& [name, bytes, says] : rows) {
     const Error error = error_of([&] { (void)open_raster(write(folder, name, bytes), {}); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-    return std::string(error.what());
-  };
-  EXPECT_THAT(what("a.r8", 9), HasSubstr("`raw` 3x3:u8)"));
-  EXPECT_THAT(what("a.R16", 18), HasSubstr("`raw` 3x3:u16le)"));
-  EXPECT_THAT(what("a.f32", 36), HasSubstr("`raw` 3x3:f32le)"));
-  EXPECT_THAT(what("a.raw", 18), HasSubstr("`raw` 3x3:u16le)"));
-  EXPECT_THAT(what("a.raw", 9), HasSubstr("`raw` 3x3:u8)"));
-  EXPECT_THAT(what("a.r16", 20), HasSubstr("as in `raw` 200x300:u16le"));
-  EXPECT_THAT(what("a.r16", 20), Not(HasSubstr("\n")));
+    EXPECT_THAT(error.what(), ::testing::AllOf(HasSubstr(says), Not(HasSubstr("\n"))));
+  }
 }
 
 TEST_F(RawSource, GoesBeforeNameAndContent) {

@@ -128,7 +128,7 @@ TEST(MosaicResolution, FinerFilesLieOverCoarserOnesWhateverTheOrder) {
     const std::vector<double> found = elevations(*mosaic);
     EXPECT_EQ(found.front(), 7.0);
     EXPECT_EQ(found.back(), 3.0);
-    EXPECT_EQ(mosaic->plan().holes.samples, 0);
+    EXPECT_EQ(mosaic->plan().samples_missing, 0);
   }
 }
 
@@ -144,10 +144,10 @@ TEST(MosaicResolution, FilesOfSeveralTypesScalesAndVoidsKeepTheirElevations) {
   }).cut(folder / "b.tif", {10, 0, 10, 5});
   {
     const auto mosaic = open_mosaic({folder / "a.tif", folder / "b.tif"});
-    EXPECT_EQ(mosaic->info().sample_type, SampleType::kInt16);
-    EXPECT_EQ(mosaic->info().void_values, std::vector<double>{-9999.0});
+    EXPECT_EQ(mosaic->info().sample_type, SampleType::kInt32);
+    EXPECT_EQ(mosaic->info().void_values, std::vector<double>{-2147483648.0});
     EXPECT_THAT(mosaic->info().warnings,
-                ::testing::ElementsAre(HasSubstr("differ in sample type; samples become int16")));
+                ::testing::ElementsAre(HasSubstr("differ in sample type; samples become int32")));
     const std::vector<double> found = elevations(*mosaic);
     for (int c = 0; c < 20; ++c) {
       if (c == 3 || c == 13) {
@@ -174,40 +174,39 @@ SampleKind kind_of(SampleType type, std::vector<double> voids = {}) {
   return {type, std::move(voids), -kInfinity, kInfinity, 1.0, 0.0};
 }
 
-TEST(MosaicSamples, CommonTypeHoldsEveryNumberOfBoth) {
+TEST(MosaicSamples, HoldEveryNumberOfAllFilesAndAVoidOfTheirOwn) {
   using enum SampleType;
   struct Case {
-    SampleType a, b, common;
+    std::vector<SampleKind> kinds;
+    bool gaps;
+    SampleType type;
+    std::vector<double> voids;
   };
-  for (const Case& one : {Case{kUint8, kInt8, kInt16}, Case{kUint8, kUint16, kUint16}, Case{kUint16, kInt16, kInt32},
-                          Case{kInt8, kInt32, kInt32}, Case{kUint32, kInt8, kFloat64}, Case{kUint32, kUint8, kUint32},
-                          Case{kFloat16, kInt8, kFloat32}, Case{kInt16, kFloat32, kFloat32},
-                          Case{kInt32, kFloat32, kFloat64}, Case{kFloat32, kFloat64, kFloat64}}) {
-    for (const auto& kinds :
-         {std::vector{kind_of(one.a), kind_of(one.b)}, std::vector{kind_of(one.b), kind_of(one.a)}}) {
-      EXPECT_EQ(choose_mosaic_samples(kinds, false, nullptr).kind.type, one.common)
-          << to_string(one.a) << to_string(one.b);
+  const std::vector<double> lowest = {-2147483648.0};
+  for (const Case& one : {
+           Case{{kind_of(kUint8)}, false, kUint8, {}},
+           Case{{kind_of(kUint8)}, true, kInt32, lowest},
+           Case{{kind_of(kInt32)}, true, kFloat64, {}},
+           Case{{kind_of(kInt16, {-32768.0}), kind_of(kInt16, {-32768.0})}, true, kInt16, {-32768.0}},
+           Case{{kind_of(kInt16, {-32768.0}), kind_of(kInt16, {-9999.0})}, false, kInt32, lowest},
+           Case{{kind_of(kInt16, {-9999.0, -32768.0}), kind_of(kInt16, {-32768.0})}, true, kInt16, {-32768.0}},
+           Case{{kind_of(kUint8), kind_of(kInt8)}, false, kInt32, lowest},
+           Case{{kind_of(kInt8), kind_of(kInt32, lowest)}, false, kInt32, lowest},
+           Case{{kind_of(kInt8), kind_of(kInt32)}, false, kFloat64, {}},
+           Case{{kind_of(kUint32), kind_of(kInt8)}, false, kFloat64, {}},
+           Case{{kind_of(kFloat16), kind_of(kInt8)}, false, kFloat32, {}},
+           Case{{kind_of(kInt16), kind_of(kFloat32)}, false, kFloat32, {}},
+           Case{{kind_of(kInt32), kind_of(kFloat32)}, false, kFloat64, {}},
+           Case{{kind_of(kFloat32, {-9999.0}), kind_of(kFloat32, {0.0})}, true, kFloat32, {}},
+       }) {
+    for (const bool reversed : {false, true}) {
+      std::vector<SampleKind> kinds = one.kinds;
+      if (reversed) std::ranges::reverse(kinds);
+      const MosaicSamples samples = choose_mosaic_samples(kinds, one.gaps, nullptr);
+      EXPECT_EQ(samples.kind.type, one.type) << to_string(kinds[0].type);
+      EXPECT_EQ(samples.kind.void_values, one.voids) << to_string(kinds[0].type);
     }
   }
-}
-
-TEST(MosaicSamples, TheCommonVoidIsNoElevationOfAnyFile) {
-  using enum SampleType;
-  const auto chosen = [](const std::vector<SampleKind>& kinds, bool gaps) {
-    const MosaicSamples samples = choose_mosaic_samples(kinds, gaps, nullptr);
-    return std::pair(samples.kind.type, samples.kind.void_values);
-  };
-  using Chosen = std::pair<SampleType, std::vector<double>>;
-  EXPECT_EQ(chosen({kind_of(kInt16, {-32768.0}), kind_of(kInt16, {-32768.0})}, true), Chosen(kInt16, {-32768.0}));
-  EXPECT_EQ(chosen({kind_of(kInt16, {-32768.0}), kind_of(kInt16, {-9999.0})}, false), Chosen(kInt32, {-2147483648.0}));
-  EXPECT_EQ(chosen({kind_of(kInt16, {-32768.0}), kind_of(kInt16, {-9999.0, -32768.0})}, false),
-            Chosen(kInt16, {-32768.0}));
-  EXPECT_EQ(chosen({kind_of(kInt16, {-32768.0}), kind_of(kUint8)}, false), Chosen(kInt16, {-32768.0}));
-  EXPECT_EQ(chosen({kind_of(kUint8), kind_of(kInt8)}, true), Chosen(kInt16, {-32768.0}));
-  EXPECT_EQ(chosen({kind_of(kUint8)}, true), Chosen(kInt16, {-32768.0}));
-  EXPECT_EQ(chosen({kind_of(kUint8)}, false), Chosen(kUint8, {}));
-  EXPECT_EQ(chosen({kind_of(kInt32)}, true), Chosen(kFloat64, {}));
-  EXPECT_EQ(chosen({kind_of(kFloat32, {-9999.0}), kind_of(kFloat32, {0.0})}, true), Chosen(kFloat32, {}));
 }
 
 }  // namespace

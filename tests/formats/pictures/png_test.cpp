@@ -4,8 +4,11 @@
 #include <png.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 
 #include "formats/reader_failure.h"
 #include "formats/readers.h"
@@ -14,7 +17,6 @@
 #include "isohf/raster.h"
 #include "support/in_folder.h"
 #include "support/rasters/samples.h"
-#include "support/real_files.h"
 #include "support/temporary_folder.h"
 
 namespace isohf::test {
@@ -30,7 +32,7 @@ struct Picture {
   int color_type = PNG_COLOR_TYPE_GRAY;
   bool interlaced = false;
   int transparent_gray = -1;  ///< tRNS, unless negative
-  bool grey = false;          ///< all channels equal
+  std::function<unsigned(std::uint32_t column, std::uint32_t row, std::uint32_t channel)> at = {};  ///< instead
 
   [[nodiscard]] std::uint32_t channels() const {
     switch (color_type) {
@@ -45,7 +47,8 @@ struct Picture {
     }
   }
   [[nodiscard]] unsigned value(std::uint32_t column, std::uint32_t row, std::uint32_t channel) const {
-    return (column * 977 + row * 3541 + (grey ? 0 : channel * 12345)) & ((1U << static_cast<unsigned>(bit_depth)) - 1U);
+    const unsigned number = at ? at(column, row, channel) : column * 977 + row * 3541 + channel * 12345;
+    return number & ((1U << static_cast<unsigned>(bit_depth)) - 1U);
   }
   [[nodiscard]] std::size_t sample_bytes() const { return bit_depth == 16 ? 2 : 1; }
 };
@@ -63,7 +66,7 @@ void write_picture(const std::string& path, const Picture& picture) {
   png_set_gAMA(png, info, 0.45);  // must change nothing
   if (picture.transparent_gray >= 0) {
     png_color_16 gray{};
-    gray.gray = static_cast<png_uint_16>(picture.transparent_gray);
+    gray.gray = gray.red = gray.green = gray.blue = static_cast<png_uint_16>(picture.transparent_gray);
     png_set_tRNS(png, info, nullptr, 0, &gray);
   }
   png_write_info(png, info);
@@ -122,7 +125,7 @@ TEST_F(PngSource, ReadsEveryDepthAndChannelAsStored) {
         write_picture(path, picture);
         for (std::uint32_t channel = 0; channel < picture.channels(); ++channel) {
           for (const std::string& name : {names[picture.channels()][channel], std::to_string(channel)}) {
-            const auto source = open_png(path, of_channel(name));
+            const auto source = kPngFormat.open(path, of_channel(name));
             EXPECT_EQ(read_whole(*source), expected_whole(picture, channel));
             EXPECT_EQ(source->info().sample_type, depth == 16 ? SampleType::kUint16 : SampleType::kUint8);
             EXPECT_TRUE(source->info().warnings.empty());
@@ -138,7 +141,7 @@ TEST_F(PngSource, DeliversWindowsInAnyOrder) {
   Picture picture;
   picture.height = 3000;  // more rows than are kept
   write_picture(path, picture);
-  const auto source = open_png(path, {});
+  const auto source = kPngFormat.open(path, {});
   for (const std::int64_t row : {0, 2990, 5, 2990, 1500, 1400, 700, 699, 0}) {
     const Window window = {3, row, 20, 9};
     ASSERT_EQ(read_window(*source, window), expected_window(picture, 0, window)) << "row " << row;
@@ -146,95 +149,157 @@ TEST_F(PngSource, DeliversWindowsInAnyOrder) {
   EXPECT_EQ(read_whole(*source), expected_whole(picture));
 }
 
-TEST_F(PngSource, WantsToKnowWhatTheColoursOfAPictureAre) {
-  Picture picture{.bit_depth = 8, .color_type = PNG_COLOR_TYPE_RGB};
-  for (const int depth : {8, 16}) {
-    picture.bit_depth = depth;
-    write_picture(path, picture);
-    const Error error = error_of([&] { (void)open_png(path, {}); });
+TEST_F(PngSource, RefusesColoursThatNobodyExplained) {
+  for (const auto& [color_type, depth] : {std::pair{PNG_COLOR_TYPE_RGB, 8}, {PNG_COLOR_TYPE_RGB, 16}}) {
+    write_picture(path, {.bit_depth = depth, .color_type = color_type});
+    const Error error = error_of([&] { (void)open_raster(path, {}); });
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
-    EXPECT_THAT(error.what(), HasSubstr("is a colour picture with channels R, G, B"));
-    EXPECT_THAT(error.what(), HasSubstr("`channel` R"));
-    EXPECT_THAT(error.what(), HasSubstr("`encoding` terrarium"));
-    EXPECT_TRUE(open_png(path, of_channel("R"))->info().warnings.empty());
+    EXPECT_EQ(std::string(error.what()),
+              path +
+                  ": is a colour picture with channels R, G, B; `channel` R reads one of them, `encoding` terrarium, "
+                  "mapbox, gsi or rgba-float unpacks elevations from all");
+    EXPECT_TRUE(open_raster(path, of_channel("R"))->info().warnings.empty());
   }
-  picture.grey = true;
-  for (const int depth : {16, 8}) {
-    picture.bit_depth = depth;
+  // One pixel of colour below the rows that are looked at when the picture is opened.
+  write_picture(path, {.height = 100, .color_type = PNG_COLOR_TYPE_RGB, .at = [](auto column, auto row, auto channel) {
+                         return column + (row == 80 && column == 7 ? channel : 0);
+                       }});
+  const auto source = open_raster(path, {});
+  (void)read_window(*source, {0, 0, 37, 80});
+  EXPECT_THAT(error_of([&] { (void)read_whole(*source); }).what(), HasSubstr(path + ": is a colour picture"));
+}
+
+/// Greys in one to four channels of which some are transparent: by opacity 0, or the colour 0 of tRNS.
+TEST_F(PngSource, ReadsGreysAndTakesTransparentOnesAsNodata) {
+  const auto ground = [](std::uint32_t column, std::uint32_t row) { return row < 5 ? 0 : 300 + column; };
+  for (const int depth : {8, 16}) {
+    for (const int color_type :
+         {PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_COLOR_TYPE_RGB, PNG_COLOR_TYPE_RGB_ALPHA}) {
+      for (const bool interlaced : {false, true}) {
+        const bool has_opacity = color_type == PNG_COLOR_TYPE_GRAY_ALPHA || color_type == PNG_COLOR_TYPE_RGB_ALPHA;
+        Picture picture{.bit_depth = depth, .color_type = color_type, .interlaced = interlaced};
+        SCOPED_TRACE(fmt::format("colour type {} depth {}", color_type, depth));
+        if (!has_opacity) picture.transparent_gray = 0;
+        picture.at = [&](auto column, auto row, auto channel) {
+          // Transparent pixels may have any colour.
+          if (has_opacity && channel + 1 == picture.channels()) return row < 5 ? 0U : 0xFFFFU;
+          return ground(column, row) + (has_opacity && row < 5 ? channel : 0);
+        };
+        write_picture(path, picture);
+        const auto source = open_raster(path, {});
+        const SourceInfo& info = source->info();
+        const std::vector<double> values = values_of(*source);
+        for (std::uint32_t i = 0; i < values.size(); ++i) {
+          const std::uint32_t row = i / picture.width;
+          ASSERT_EQ(is_void(info, values[i]), row < 5) << i;
+          if (row < 5) continue;
+          ASSERT_EQ(values[i], ground(i % picture.width, row) & (depth == 8 ? 0xFFU : 0xFFFFU)) << i;
+        }
+        const bool has_colours = picture.channels() > 2;
+        EXPECT_EQ(info.warnings.size(), (has_colours ? 1U : 0U) + (has_opacity ? 1U : 0U));
+        const SampleType wide = depth == 8 ? SampleType::kInt16 : SampleType::kInt32;
+        const SampleType plain = depth == 8 ? SampleType::kUint8 : SampleType::kUint16;
+        EXPECT_EQ(info.sample_type, has_opacity ? wide : plain);
+      }
+    }
+  }
+  write_picture(path, {.transparent_gray = 777});
+  EXPECT_EQ(kPngFormat.open(path, {})->info().void_values, std::vector<double>{777.0});
+  // One bit of it damaged: neither another void value nor none.
+  std::string bytes = read_file(path);
+  bytes[bytes.find("tRNS") + 5] ^= 1;
+  write_file(path, bytes);
+  EXPECT_EQ(error_of([&] { (void)kPngFormat.open(path, {}); }).code(), ErrorCode::kCorrupt);
+}
+
+OpenOptions of_encoding(const std::string& encoding) {
+  OpenOptions options;
+  options.encoding = encoding;
+  return options;
+}
+
+/// Pixels of four values, red first, and the elevation that they are; NaN: none.
+TEST_F(PngSource, UnpacksElevations) {
+  constexpr double kVoid = NAN;
+  struct Case {
+    const char* encoding;
+    std::array<unsigned, 4> pixel;
+    double elevation;
+  };
+  const std::vector<Case> cases = {{"terrarium", {131, 220, 128, 255}, 988.5},
+                                   {"terrarium", {0, 0, 0, 255}, kVoid},
+                                   {"terrarium", {131, 220, 128, 0}, kVoid},
+                                   {"mapbox", {1, 134, 160, 255}, 0.0},
+                                   {"mapbox", {0, 0, 1, 255}, -9999.9},
+                                   {"mapbox", {0, 0, 0, 255}, kVoid},
+                                   {"gsi", {5, 192, 144, 255}, 3769.76},
+                                   {"gsi", {0, 0, 0, 255}, 0.0},
+                                   {"gsi", {255, 255, 156, 255}, -1.0},
+                                   {"gsi", {128, 0, 0, 255}, kVoid},
+                                   {"rgba-float", {0x44, 0x77, 0x20, 0x00}, 988.5},
+                                   {"rgba-float", {0x7F, 0xC0, 0x00, 0x00}, kVoid}};
+  for (const Case& each : cases) {
+    for (const int color_type : {PNG_COLOR_TYPE_RGB, PNG_COLOR_TYPE_RGB_ALPHA}) {
+      const bool needs_opacity = each.pixel[3] != 255;
+      if (needs_opacity && color_type == PNG_COLOR_TYPE_RGB) continue;
+      SCOPED_TRACE(fmt::format("{} {}", each.encoding, fmt::join(each.pixel, " ")));
+      write_picture(
+          path,
+          {.width = 3, .height = 2, .bit_depth = 8, .color_type = color_type, .at = [&](auto, auto, auto channel) {
+             return each.pixel[channel];
+           }});
+      const auto source = open_raster(path, of_encoding(each.encoding));
+      const SourceInfo& info = source->info();
+      const double value = values_of(*source)[5];
+      EXPECT_EQ(is_void(info, value), std::isnan(each.elevation));
+      if (!std::isnan(each.elevation)) {
+        EXPECT_NEAR(value * info.z_scale + info.z_offset, each.elevation, 1e-9);
+      }
+      EXPECT_EQ(info.channel, each.encoding);
+      EXPECT_EQ(info.vertical_unit, "metre");
+      EXPECT_TRUE(info.warnings.empty());
+    }
+  }
+}
+
+/// Level tiles are stored as grey, or with a palette, by programs that make pictures small.
+TEST_F(PngSource, UnpacksElevationsThatAPictureHasAsGreysOrAPalette) {
+  for (const auto& [color_type, depth] : {std::pair{PNG_COLOR_TYPE_PALETTE, 2}, {PNG_COLOR_TYPE_GRAY, 8}}) {
+    Picture picture{.bit_depth = depth, .color_type = color_type};
     write_picture(path, picture);
-    const auto in_greys = open_png(path, {});
-    EXPECT_EQ(in_greys->info().channel, "R");
-    EXPECT_EQ(in_greys->info().sample_type, depth == 8 ? SampleType::kUint8 : SampleType::kUint16);
-    ASSERT_EQ(in_greys->info().warnings.size(), 1U);
-    EXPECT_THAT(in_greys->info().warnings[0], HasSubstr("greys"));
-  }
-  picture.grey = false;
-  picture.color_type = PNG_COLOR_TYPE_GRAY_ALPHA;
-  write_picture(path, picture);
-  const auto source = open_png(path, {});
-  ASSERT_EQ(source->info().warnings.size(), 1U);
-  EXPECT_THAT(source->info().warnings[0], HasSubstr("transparent"));
-  picture.color_type = PNG_COLOR_TYPE_GRAY;
-  write_picture(path, picture);
-  EXPECT_TRUE(open_png(path, {})->info().warnings.empty());
-}
-
-TEST_F(PngSource, KnowsHowElevationsArePackedWithoutBeingTold) {
-  if (real_files().empty()) GTEST_SKIP() << kNoRealFiles;
-  for (const auto& [name, encoding] : {std::pair{"terrarium.png", "terrarium"},
-                                       {"derived/n44e006_mapbox.png", "mapbox"},
-                                       {"gale_rgba_float_16_57775_31917.png", "rgba-float"}}) {
-    SCOPED_TRACE(name);
-    const std::string file = real_data() / name;
-    const auto source = open_raster(file, of_channel(encoding));
-    const SourceInfo& info = source->info();
-    EXPECT_EQ(info.channel, encoding);
-    EXPECT_EQ(info.vertical_unit, "metre");
-    EXPECT_TRUE(info.warnings.empty());
-    const auto all = read_whole(*source);
-    // The bytes leave no doubt: the same without being told, and a warning says so.
-    const auto untold = open_raster(file, {});
-    EXPECT_EQ(untold->info().channel, encoding);
-    ASSERT_EQ(untold->info().warnings.size(), 1U);
-    EXPECT_THAT(untold->info().warnings[0], HasSubstr(fmt::format("decoded as with `encoding` {}", encoding)));
-    EXPECT_EQ(read_whole(*untold), all);
-    const auto red = open_raster(file, of_channel("R"));
-    EXPECT_EQ(red->info().sample_type, SampleType::kUint8);
-    EXPECT_TRUE(red->info().warnings.empty());
-  }
-}
-
-TEST_F(PngSource, TakesTransparentPixelsOfPackedElevationsAsVoid) {
-  Picture picture{.bit_depth = 8, .color_type = PNG_COLOR_TYPE_RGB_ALPHA};
-  write_picture(path, picture);
-  const auto source = open_raster(path, of_channel("mapbox"));
-  EXPECT_EQ(source->info().void_values, std::vector<double>{-1.0});
-  const std::vector<double> values = values_of(*source);
-  int voids = 0;
-  for (std::uint32_t row = 0; row < picture.height; ++row) {
-    for (std::uint32_t column = 0; column < picture.width; ++column) {
-      const auto channel = [&](std::uint32_t c) { return static_cast<double>(picture.value(column, row, c)); };
-      const bool is_void = channel(3) == 0.0;
-      voids += is_void ? 1 : 0;
-      ASSERT_EQ(values[row * picture.width + column],
-                is_void ? -1.0 : channel(0) * 65536 + channel(1) * 256 + channel(2));
+    const std::vector<double> values = values_of(*open_raster(path, of_encoding("mapbox")));
+    for (std::uint32_t i = 0; i < values.size(); ++i) {
+      ASSERT_EQ(values[i], picture.value(i % picture.width, i / picture.width, 0) * 0x010101);
     }
   }
-  EXPECT_GT(voids, 0);
+  write_picture(path, {.bit_depth = 2, .color_type = PNG_COLOR_TYPE_PALETTE});
+  EXPECT_THAT(error_of([&] { (void)open_raster(path, {}); }).what(),
+              AllOf(HasSubstr("palette"), HasSubstr("unless these are packed into them")));
+  for (const auto& [color_type, depth, encoding] : {std::tuple{PNG_COLOR_TYPE_RGB, 16, "mapbox"},
+                                                    {PNG_COLOR_TYPE_RGB, 8, "rgba-float"},
+                                                    {PNG_COLOR_TYPE_RGB, 8, "utm"}}) {
+    write_picture(path, {.bit_depth = depth, .color_type = color_type});
+    const Error error = error_of([&] { (void)open_raster(path, of_encoding(encoding)); });
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+    EXPECT_THAT(error.what(), HasSubstr(path + ": "));
+    EXPECT_THAT(error.what(), HasSubstr("encoding"));
+  }
 }
 
-TEST_F(PngSource, UnpacksElevationsOutOfAPalette) {
-  Picture picture{.bit_depth = 2, .color_type = PNG_COLOR_TYPE_PALETTE};
-  write_picture(path, picture);
-  const Error error = error_of([&] { (void)open_raster(path, {}); });
-  EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
-  EXPECT_THAT(error.what(), AllOf(HasSubstr("palette"), HasSubstr("unless these are packed into them")));
-  const std::vector<double> values = values_of(*open_raster(path, of_channel("mapbox")));
-  for (std::uint32_t row = 0; row < picture.height; ++row) {
-    for (std::uint32_t column = 0; column < picture.width; ++column) {
-      ASSERT_EQ(values[row * picture.width + column], picture.value(column, row, 0) * 0x010101);
-    }
-  }
+/// rio-rgbify packs with any base and interval.
+TEST_F(PngSource, TakesTheBaseAndIntervalOfMapboxTilesFromTheUser) {
+  write_picture(path, {.bit_depth = 8, .color_type = PNG_COLOR_TYPE_RGB, .at = [](auto, auto, auto) { return 2; }});
+  OpenOptions options = of_encoding("mapbox");
+  options.z_scale = 0.001;
+  options.z_offset = -100.0;
+  const SourceInfo both = open_raster(path, options)->info();
+  EXPECT_EQ(both.z_scale, 0.001);
+  EXPECT_EQ(both.z_offset, -100.0);
+  options.z_offset.reset();
+  options.z_scale = 2.0;
+  const SourceInfo one = open_raster(path, options)->info();
+  EXPECT_EQ(one.z_scale, 0.2);
+  EXPECT_EQ(one.z_offset, -20000.0);
 }
 
 TEST_F(PngSource, PlacesTilesOfWebMapsByTheirNumbers) {
@@ -243,7 +308,7 @@ TEST_F(PngSource, PlacesTilesOfWebMapsByTheirNumbers) {
   picture.width = picture.height = 32;
   picture.bit_depth = 8;
   picture.color_type = PNG_COLOR_TYPE_RGB;
-  const OpenOptions packed = of_channel("terrarium");
+  const OpenOptions packed = of_encoding("terrarium");
   const auto place_of = [&](const std::string& name, const OpenOptions& options) {
     write_picture(folder / name, picture);
     return open_raster(folder / name, options)->info().georeference;
@@ -268,71 +333,11 @@ TEST_F(PngSource, PlacesTilesOfWebMapsByTheirNumbers) {
   EXPECT_FALSE(place_of("3/5/4.png", packed).has_origin);
 }
 
-TEST_F(PngSource, UnpacksNothingButColoursOfEightBits) {
-  for (const auto& [color_type, depth, encoding] : {std::tuple{PNG_COLOR_TYPE_GRAY, 8, "terrarium"},
-                                                    {PNG_COLOR_TYPE_RGB, 16, "mapbox"},
-                                                    {PNG_COLOR_TYPE_RGB, 8, "rgba-float"}}) {
-    Picture picture{.bit_depth = depth, .color_type = color_type};
-    write_picture(path, picture);
-    const Error error = error_of([&] { (void)open_raster(path, of_channel(encoding)); });
-    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-    EXPECT_THAT(error.what(), HasSubstr(fmt::format("encoding {} packs an elevation", encoding)));
-  }
-}
-
-TEST_F(PngSource, TakesGreyPixelsWithoutOpacityAsVoid) {
-  Picture picture{.bit_depth = 8, .color_type = PNG_COLOR_TYPE_GRAY_ALPHA};
-  write_picture(folder / "a.png", picture);
-  const auto source = open_png(folder / "a.png", {});
-  ASSERT_EQ(source->info().sample_type, SampleType::kInt16);
-  ASSERT_EQ(source->info().void_values.size(), 1U);
-  std::vector<std::int16_t> samples(std::size_t{picture.width} * picture.height);
-  source->read_window({0, 0, picture.width, picture.height}, std::as_writable_bytes(std::span(samples)));
-  std::int64_t voids = 0;
-  for (std::uint32_t i = 0; i < samples.size(); ++i) {
-    const std::uint32_t column = i % picture.width;
-    const std::uint32_t row = i / picture.width;
-    const bool is_void = picture.value(column, row, 1) == 0;
-    ASSERT_EQ(samples[i], is_void ? source->info().void_values[0] : picture.value(column, row, 0));
-    voids += is_void ? 1 : 0;
-  }
-  EXPECT_GT(voids, 0);
-}
-
-TEST_F(PngSource, TakesTransparentGrayAsVoid) {
-  Picture picture;
-  picture.transparent_gray = 777;
-  write_picture(path, picture);
-  EXPECT_EQ(open_png(path, {})->info().void_values, std::vector<double>{777.0});
-  // One bit of it damaged: neither another void value nor none.
-  std::string bytes = read_file(path);
-  bytes[bytes.find("tRNS") + 5] ^= 1;
-  write_file(path, bytes);
-  EXPECT_EQ(error_of([&] { (void)open_png(path, {}); }).code(), ErrorCode::kCorrupt);
-}
-
 TEST_F(PngSource, RefusesUnknownChannels) {
   write_picture(path, {.bit_depth = 8, .color_type = PNG_COLOR_TYPE_RGB});
-  const Error error = error_of([&] { (void)open_png(path, of_channel("Z")); });
+  const Error error = error_of([&] { (void)kPngFormat.open(path, of_channel("Z")); });
   EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
   EXPECT_THAT(error.what(), HasSubstr(path + ": has no channel \"Z\"; it has R, G, B (or 0...2)"));
-}
-
-TEST_F(PngSource, ReportsEveryTruncation) {
-  const std::string cut = folder / "cut.png";
-  for (const bool interlaced : {false, true}) {
-    Picture picture;
-    picture.interlaced = interlaced;
-    write_picture(path, picture);
-    const auto bytes = read_file(path);
-    for (std::size_t length = 0; length < bytes.size(); ++length) {
-      write_file(cut, bytes.substr(0, length));
-      SCOPED_TRACE(fmt::format("{} of {} bytes", length, bytes.size()));
-      const Error error = error_of([&] { (void)read_whole(*open_png(cut, {})); });
-      EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
-      EXPECT_THAT(error.what(), HasSubstr(cut));
-    }
-  }
 }
 
 TEST_F(PngSource, NamesTheRowThatIsMissingAndReadsTheOnesBefore) {
@@ -342,7 +347,7 @@ TEST_F(PngSource, NamesTheRowThatIsMissingAndReadsTheOnesBefore) {
   write_picture(path, picture);
   const auto bytes = read_file(path);
   write_file(path, bytes.substr(0, bytes.size() * 9 / 10));
-  const auto source = open_png(path, {});
+  const auto source = kPngFormat.open(path, {});
   EXPECT_THAT(error_of([&] { (void)read_whole(*source); }).what(), HasSubstr("PNG row "));
   const Window top = {0, 0, picture.width, 5};
   EXPECT_EQ(read_window(*source, top), expected_window(picture, 0, top));
@@ -361,7 +366,7 @@ TEST_F(PngSource, NeverDeliversASampleThatAFlippedBitChanged) {
       changed[at] = static_cast<char>(changed[at] ^ 0x10);
       write_file(path, changed);
       try {
-        EXPECT_EQ(read_whole(*open_png(path, {})), expected_whole(picture)) << "byte " << at;
+        EXPECT_EQ(read_whole(*kPngFormat.open(path, {})), expected_whole(picture)) << "byte " << at;
       } catch (const Error& error) {
         EXPECT_THAT(error.what(), HasSubstr(path));
       }
@@ -392,13 +397,13 @@ void write_header_only(const std::string& path, std::uint32_t width, std::uint32
 TEST_F(PngSource, RefusesAbsurdSizesBeforeAllocating) {
   for (const auto& [width, height] : {std::pair{0x7FFFFFFFU, 1U}, {0x7FFFFFFFU, 0x7FFFFFFFU}, {100000U, 100000U}}) {
     write_header_only(path, width, height, 0);
-    const Error error = error_of([&] { (void)open_png(path, {}); });
+    const Error error = error_of([&] { (void)kPngFormat.open(path, {}); });
     EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
     EXPECT_THAT(error.what(), HasSubstr("has no room"));
   }
   for (const auto& [width, height] : {std::pair{0U, 5U}, {5U, 0U}, {0x80000000U, 5U}}) {
     write_header_only(path, width, height, 0);
-    EXPECT_EQ(error_of([&] { (void)open_png(path, {}); }).code(), ErrorCode::kCorrupt);
+    EXPECT_EQ(error_of([&] { (void)kPngFormat.open(path, {}); }).code(), ErrorCode::kCorrupt);
   }
 }
 

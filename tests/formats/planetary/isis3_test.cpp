@@ -10,14 +10,16 @@
 #include "isohf/error.h"
 #include "isohf/raster.h"
 #include "support/rasters/every_window.h"
+#include "support/rasters/place_at.h"
 #include "support/rasters/samples.h"
 #include "support/temporary_folder.h"
 
 namespace isohf {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 
 constexpr std::size_t kLabelBytes = 1536;
 
@@ -73,8 +75,13 @@ class Isis3 : public test::ReaderTest {
  protected:
   std::string write(const std::string& bytes) const { return ReaderTest::write("a.cub", bytes); }
 
-  std::string failure(const std::string& bytes, ErrorCode* code = nullptr) const {
-    return failure_at(write(bytes), code, open_isis3);
+  std::string failure(const std::string& bytes) const { return failure_at(write(bytes), nullptr, kIsis3Format.open); }
+
+  /// With a word of its map replaced.
+  SourceInfo on_map(const std::string& word, const std::string& by) const {
+    std::string mapping = kMapping;
+    mapping.replace(mapping.find(word), word.size(), by);
+    return open_raster(write(label(kTiles, 1, kWord, mapping) + tiles(3, 2, 1, false)), {})->info();
   }
 };
 
@@ -109,19 +116,15 @@ TEST_F(Isis3, FollowsADetachedLabelToItsCore) {
   EXPECT_EQ(test::read_whole(*source), test::read_whole(*expected));
   EXPECT_EQ(source->info().georeference.origin_x, expected->info().georeference.origin_x);
   std::filesystem::remove(folder / "data.CUB");
-  ErrorCode code = ErrorCode::kCancelled;
-  EXPECT_THAT(test::failure_of(path, &code, [&] { (void)open_raster(path, {}); }),
+  EXPECT_THAT(failure_at(path, nullptr, kIsis3Format.open),
               HasSubstr("^Core names DATA.cub, which must be a file beside the label"));
-  EXPECT_EQ(code, ErrorCode::kIo);
 }
 
 TEST_F(Isis3, PlacesPixelsAndScalesThem) {
   const auto source = open_raster(write(label(kTiles, 1, kWord) + tiles(3, 2, 1, false)), {});
   const SourceInfo& info = source->info();
   EXPECT_EQ(info.georeference.registration, Registration::kArea);
-  EXPECT_EQ(info.georeference.origin_x, -95.0);
-  EXPECT_EQ(info.georeference.origin_y, 195.0);
-  EXPECT_EQ(info.georeference.spacing_x, 10.0);
+  EXPECT_THAT(test::grid_of(info.georeference), ElementsAre(-95.0, 195.0, 10.0, 10.0));
   EXPECT_EQ(info.georeference.system.name, "SimpleCylindrical Moon");
   EXPECT_EQ(info.georeference.system.inverse_flattening, 0.0);
   EXPECT_EQ(info.z_scale, 0.5);
@@ -131,50 +134,52 @@ TEST_F(Isis3, PlacesPixelsAndScalesThem) {
   EXPECT_TRUE(bare->info().warnings.empty());
 }
 
-/// What they mean reference_systems.py holds against GDAL.
+/// What they mean reference_systems.py compares with GDAL.
 TEST_F(Isis3, MapsAreUnderstoodOrMissedAloud) {
-  const auto warnings_of = [&](const std::string& kind, const std::string& more = "") {
-    std::string mapping = kMapping;
-    mapping.replace(mapping.find("SimpleCylindrical"), 17, kind + "\n" + more);
-    const auto source = open_raster(write(label(kTiles, 1, kWord, mapping) + tiles(3, 2, 1, false)), {});
-    EXPECT_EQ(source->info().warnings.empty(), !source->info().georeference.system.wkt.empty());
-    return source->info().warnings;
-  };
-  EXPECT_THAT(warnings_of("ObliqueCylindrical", "PoleLatitude = 30\nPoleRotation = 10\n"), IsEmpty());
-  EXPECT_THAT(warnings_of("PointPerspective", "Distance = 30000\n"), IsEmpty());
-  for (const std::vector<Warning>& lost :
-       {warnings_of("Planar"), warnings_of("PointPerspective"), warnings_of("PointPerspective", "Distance = 1000\n")}) {
-    ASSERT_EQ(lost.size(), 1U);
-    EXPECT_EQ(lost.front().kind, Warning::Kind::kLoss);
-    EXPECT_THAT(lost.front(), HasSubstr("is not known: coordinates are metres of a map without a name"));
+  for (const auto& [kind, more, lost] :
+       {std::tuple("ObliqueCylindrical", "PoleLatitude = 30\nPoleRotation = 10\n", ""),
+        {"PointPerspective", "Distance = 30000\n", ""},
+        {"PointPerspective", "Distance = 1000\n", "the map projection PointPerspective is not known"},
+        {"PointPerspective", "", "the map projection PointPerspective is not known"},
+        {"Planar", "", "the map projection Planar is not known: coordinates are those of a map without a name"}}) {
+    const SourceInfo info = on_map("SimpleCylindrical", std::string(kind) + "\n" + more);
+    EXPECT_EQ(info.georeference.unit, HorizontalUnit::kMetre);
+    EXPECT_EQ(info.georeference.system.wkt.empty(), *lost != '\0') << kind << more;
+    ASSERT_EQ(info.warnings.size(), *lost != '\0' ? 1U : 0U) << kind << more;
+    if (*lost == '\0') continue;
+    EXPECT_EQ(info.warnings[0].kind, Warning::Kind::kLoss);
+    EXPECT_THAT(info.warnings[0], HasSubstr(lost));
   }
-  EXPECT_THAT(warnings_of("Planar").front(), HasSubstr("Planar"));
+  // ISIS draws both to scale on the parallel of the centre.
+  for (const char* kind : {"Mercator", "PolarStereographic"}) {
+    const std::string wkt =
+        on_map("SimpleCylindrical", std::string(kind) + "\nCenterLatitude = -70\n").georeference.system.wkt;
+    EXPECT_THAT(wkt, AllOf(HasSubstr("standard parallel\",-70"), HasSubstr("D_Moon"), HasSubstr(kind))) << kind;
+  }
+  EXPECT_THAT(on_map("UpperLeftCornerX", "x").warnings, ElementsAre(HasSubstr("the origin is unknown")));
+  for (const char* without : {"PixelResolution", "Rotation = 5\nTargetName"}) {
+    const SourceInfo info = on_map(without[0] == 'P' ? without : "TargetName", without[0] == 'P' ? "x" : without);
+    EXPECT_EQ(info.georeference.unit, HorizontalUnit::kUnknown);
+    EXPECT_THAT(info.warnings, ElementsAre(HasSubstr("its place is left out")));
+  }
 }
 
 TEST_F(Isis3, TakesSpecialPixelsForVoids) {
-  struct Kind {
-    const char* name;
-    SampleType type;
-    std::vector<double> special;
-    std::vector<double> plain;
-  };
   const auto real = [](std::uint32_t bits) { return static_cast<double>(std::bit_cast<float>(bits)); };
-  const Kind kinds[] = {
-      {"UnsignedByte", SampleType::kUint8, {0, 255}, {1, 254}},
-      {"SignedWord", SampleType::kInt16, {-32768, -32767, -32766, -32765, -32764}, {-32752, 32767}},
-      {"UnsignedWord", SampleType::kUint16, {0, 1, 2, 65534, 65535}, {3, 65522}},
-      {"UnsignedInteger", SampleType::kUint32, {0, 1, 2, 4294967294.0, 4294967295.0}, {3, 4294967282.0}},
-      {"Real",
-       SampleType::kFloat32,
-       {real(0xFF7FFFFB), real(0xFF7FFFFC), real(0xFF7FFFFD), real(0xFF7FFFFE), real(0xFF7FFFFF)},
-       {real(0xFF7FFFFA), 0.0, real(0x7F7FFFFF)}}};
-  for (const Kind& kind : kinds) {
-    SCOPED_TRACE(kind.name);
+  for (const auto& [name, type, special, plain] :
+       {std::tuple("UnsignedByte", SampleType::kUint8, std::vector{0.0, 255.0}, std::vector{1.0, 254.0}),
+        {"SignedWord", SampleType::kInt16, {-32768, -32767, -32766, -32765, -32764}, {-32752, 32767}},
+        {"UnsignedWord", SampleType::kUint16, {0, 1, 2, 65534, 65535}, {3, 65522}},
+        {"UnsignedInteger", SampleType::kUint32, {0, 1, 2, 4294967294.0, 4294967295.0}, {3, 4294967282.0}},
+        {"Real",
+         SampleType::kFloat32,
+         {real(0xFF7FFFFB), real(0xFF7FFFFF)},
+         {real(0xFF7FFFFA), 0.0, real(0x7F7FFFFF)}}}) {
     const auto source =
-        open_raster(write(label(kTiles, 1, fmt::format("Type = {}", kind.name)) + std::string(2000, '\1')), {});
-    EXPECT_EQ(source->info().sample_type, kind.type);
-    for (const double value : kind.special) EXPECT_TRUE(test::is_void(source->info(), value)) << value;
-    for (const double value : kind.plain) EXPECT_FALSE(test::is_void(source->info(), value)) << value;
+        open_raster(write(label(kTiles, 1, fmt::format("Type = {}", name)) + std::string(2000, '\1')), {});
+    EXPECT_EQ(source->info().sample_type, type);
+    for (const double value : special) EXPECT_TRUE(test::is_void(source->info(), value)) << name << value;
+    for (const double value : plain) EXPECT_FALSE(test::is_void(source->info(), value)) << name << value;
   }
 }
 

@@ -17,7 +17,7 @@
 #include "isohf/archive/tile/residuals/residual_symbols.h"
 #include "isohf/archive/tile/tile_payload.h"
 #include "isohf/base/assert.h"
-#include "isohf/base/scratch.h"
+#include "isohf/base/memory/scratch.h"
 #include "isohf/base/simd.h"
 
 namespace isohf {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "isohf/base/arena.h"
-#include "isohf/base/number_text.h"
+#include "isohf/base/text/number_text.h"
 #include "isohf/error.h"
 
 namespace isohf {

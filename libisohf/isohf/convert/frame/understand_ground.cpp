@@ -4,8 +4,8 @@
 
 #include "isohf/convert.h"
 #include "isohf/error.h"
-#include "isohf/projection/crs.h"
-#include "isohf/projection/crs_operation.h"
+#include "isohf/projection/crs/crs.h"
+#include "isohf/projection/crs/crs_operation.h"
 #include "isohf/projection/reference_map.h"
 
 namespace isohf {

@@ -132,6 +132,27 @@ QuantisationRequest request_of(Conversion& conversion, const ElevationRange& ran
   return quantisation_request(conversion.source.info(), conversion.options, conversion.height_error);
 }
 
+/// Warns of values far from all others, such as undeclared voids, and if they stretch the codes until the others share a
+/// few.
+void warn_of_outliers(const Conversion& conversion, const SourceSurvey& survey, const QuantisationRequest& request,
+                      std::vector<Warning>& warnings) {
+  constexpr double kFewCodes = 64.0;
+  const SourceInfo& info = conversion.source.info();
+  const auto [voids, others] = survey.outliers();
+  if (voids.empty()) return;
+  std::string consequence;
+  if (request.type != CodeType::kF32) {
+    const double step = conversion.quantisation.scale;
+    const double codes = std::floor((others.max - others.min) / step) + 1.0;
+    if (codes < kFewCodes && choose_quantisation(request, others, info).scale < step) {
+      consequence = codes < 2.0 ? fmt::format(", which share one code of {:.3g}", step)
+                                : fmt::format(", which share {} codes of {:.3g}", codes, step);
+    }
+  }
+  const std::string text = survey.warning(consequence);
+  if (!text.empty()) warnings.push_back(loss(info.path + ": " + text));
+}
+
 }  // namespace
 
 QuantisationRequest quantisation_request(const SourceInfo& info, const ConvertOptions& options, double height_error) {
@@ -160,8 +181,6 @@ void choose_codes(Conversion& conversion, ConvertSummary& summary) {
   const SourceSurvey survey = survey_source(conversion, edge);
   SourceScan found = survey.scan();
   if (found.valid > 0) warn_of_unit_range(info, found.range, summary.warnings);
-  if (const std::string warning = survey.warning(); !warning.empty())
-    summary.warnings.push_back(info.path + ": " + warning);
   summary.source_voids = found.voids;
   if (found.valid == 0) {
     throw Error(ErrorCode::kNoElevation,
@@ -171,6 +190,7 @@ void choose_codes(Conversion& conversion, ConvertSummary& summary) {
   const QuantisationRequest request = request_of(conversion, found.range);
   if (conversion.plan.outside != Outside::kClamp) found.range = EdgeRange::widen(found.range, edge.bound());
   conversion.quantisation = choose_quantisation(request, found.range, info);
+  warn_of_outliers(conversion, survey, request, summary.warnings);
   conversion.range = found.range;
   const double over = overshoot(conversion.kernel, conversion.prefilter);
   if (over > 0.0 && conversion.options.code_type != CodeType::kF32) {

@@ -33,10 +33,31 @@ SampleType source_type(const Metadata& metadata) {
   return sample_type_from_string(metadata.source.sample_type);
 }
 
-std::string remedy_for(const Statistics& elevations) {
-  const char* const ways = "use `clamp_range`, `method` barycentric, `raw_scale` or another `code_type`";
-  if (!elevations.min || !elevations.max) return ways;
-  return fmt::format("{} (elevations are {:.9g} to {:.9g})", ways, *elevations.min, *elevations.max);
+/// Scale and offset that hold all elevations, as "`raw_scale` 0.0162 `raw_offset` -530.8416, "; empty for floats.
+/// Elevation 0 keeps its number, as engines have the sea at one, if that is possible. The numbers at both ends are left
+/// for nodata.
+std::string mapping_for(const SampleMapping& mapping, double least, double greatest) {
+  if (is_floating(mapping.type)) return {};
+  const auto [low, high] = sample_range(mapping.type);
+  const double zero = -mapping.z_offset / mapping.z_scale;
+  const double below = zero - low - 1.0;  // numbers on either side of elevation 0
+  const double above = high - 1.0 - zero;
+  const bool keeps_zero = (least >= 0.0 || below > 0.0) && (greatest <= 0.0 || above > 0.0);
+  const double needed = keeps_zero
+                            ? std::max(least < 0.0 ? -least / below : 0.0, greatest > 0.0 ? greatest / above : 0.0)
+                            : (greatest - least) / (high - low - 2.0);
+  if (!(needed > 0.0)) return {};
+  const double unit = std::pow(10.0, std::floor(std::log10(needed)) - 2.0);
+  const double scale = std::ceil(needed * 1.001 / unit) * unit;  // the surface may leave the range of its vertices
+  const double offset = keeps_zero ? 0.0 - zero * scale : least - (low + 1.0) * scale;
+  return fmt::format("`raw_scale` {:.3g}{}, ", scale, offset == 0.0 ? "" : fmt::format(" `raw_offset` {:.9g}", offset));
+}
+
+std::string remedy_for(const SampleMapping& mapping, const Statistics& elevations) {
+  const std::string ways = "`clamp_range`, `method` barycentric or another `code_type`";
+  if (!elevations.min || !elevations.max) return "use " + ways;
+  return fmt::format("use {}{} (elevations are {:.9g} to {:.9g})",
+                     mapping_for(mapping, *elevations.min, *elevations.max), ways, *elevations.min, *elevations.max);
 }
 
 class SurfaceSamples final : public RasterSamples {
@@ -59,7 +80,7 @@ class SurfaceSamples final : public RasterSamples {
     const auto clamp = request_.clamps  ? SampleStore::Clamp::kAll
                        : is_source_type ? SampleStore::Clamp::kAtFreeEnds
                                         : SampleStore::Clamp::kNone;
-    RowStore store({mapping_, nodata_, clamp}, {request_.path, grid_.width, remedy_for(metadata.statistics)});
+    RowStore store({mapping_, nodata_, clamp}, {request_.path, grid_.width, remedy_for(mapping_, metadata.statistics)});
     const Job job = staged(job_, "export");
     RowReader(archive_, grid_, method_, job)
         .read_all(

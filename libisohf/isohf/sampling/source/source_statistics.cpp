@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <type_traits>
+#include <utility>
 
 #include "isohf/base/sample.h"
 #include "isohf/base/void_values.h"
@@ -113,9 +114,6 @@ double sum(const SourceInfo& info, std::span<const std::byte> raw) {
 
 constexpr std::array<double, 10> kMarks = {-32768.0, -32767.0, 32767.0, 65535.0,   -9999.0,
                                            9999.0,   -99999.0, 99999.0, -999999.0, 999999.0};
-/// No elevation on any body is as large in any unit.
-constexpr double kHuge = 1e30;
-
 bool is_mark(double value) {
   return std::find(kMarks.begin(), kMarks.end(), value) != kMarks.end();
 }
@@ -126,6 +124,25 @@ void merge(SourceScan& into, const SourceScan& part) {
   into.range.min = into.valid == 0 ? part.range.min : std::min(into.range.min, part.range.min);
   into.range.max = into.valid == 0 ? part.range.max : std::max(into.range.max, part.range.max);
   into.valid += part.valid;
+}
+
+/// The end of the range of raw samples that has half of it for itself; nullopt if there are others in both halves.
+template <typename T>
+std::optional<double> lonely_end(const SourceInfo& info, std::span<const std::byte> raw, const ElevationRange& range) {
+  const double middle = range.min / 2.0 + range.max / 2.0;
+  const std::size_t count = raw.size() / sizeof(T);
+  bool has_low = false;
+  bool has_high = false;
+  for (const std::size_t step : {std::size_t{97}, std::size_t{1}}) {  // a few samples are enough of most parts
+    for (std::size_t i = 0; i < count; i += step) {
+      const auto value = static_cast<double>(number_of(stored_at<T>(raw.data() + i * sizeof(T))));
+      if (!(value > range.min && value < range.max)) continue;
+      if (std::ranges::find(info.void_values, value) != info.void_values.end()) continue;
+      (value < middle ? has_low : has_high) = true;
+      if (has_low && has_high) return std::nullopt;
+    }
+  }
+  return has_high ? range.min : range.max;
 }
 
 }  // namespace
@@ -153,48 +170,48 @@ void SourceSurvey::add(std::span<const std::byte> raw) {
   scan_samples(info_, raw, part);
   merge(all_, part);
   if (with_mean_) sum_ += sum_of_samples(info_, raw);
-  look_for_voids(raw, part);
+  find_clusters(raw, part);
 }
 
 void SourceSurvey::add(const SourceSurvey& other) {
   merge(all_, other.all_);
-  merge(others_, other.others_);
-  merge(huge_negative_, other.huge_negative_);
-  merge(huge_positive_, other.huge_positive_);
-  for (const auto& [value, count] : other.suspects_) suspects_[value] += count;
+  for (const Cluster& cluster : other.clusters_) add(cluster);
   sum_ += other.sum_;
 }
 
-/// Takes suspects out of the part, one after the other, until its ends are none.
-void SourceSurvey::look_for_voids(std::span<const std::byte> raw, SourceScan part) {
+/// Takes lonely ends off the part, one after the other. One that lies far from all samples of the source does so in
+/// every part that has it.
+void SourceSurvey::find_clusters(std::span<const std::byte> raw, SourceScan part) {
+  constexpr int kMostEnds = 4;
   SourceInfo without = info_;
-  while (part.valid > 0) {
-    const double low = part.range.min;
-    const double high = part.range.max;
+  for (int i = 0; i < kMostEnds && part.valid > 0 && part.range.min < part.range.max; ++i) {
+    const std::optional<double> end = with_stored_type(
+        info_.sample_type, [&](auto sample) { return lonely_end<decltype(sample)>(without, raw, part.range); });
+    if (!end) break;
     const std::int64_t before = part.valid;
-    std::int64_t* count = nullptr;
-    if (low <= -kHuge) {
-      SourceInfo only = without;
-      only.valid_max = -kHuge;
-      scan_samples(only, raw, huge_negative_);
-      without.valid_min = std::max(without.valid_min, std::nextafter(-kHuge, 0.0));
-    } else if (high >= kHuge) {
-      SourceInfo only = without;
-      only.valid_min = kHuge;
-      scan_samples(only, raw, huge_positive_);
-      without.valid_max = std::min(without.valid_max, std::nextafter(kHuge, 0.0));
-    } else if (is_mark(low) || is_mark(high)) {
-      const double value = is_mark(low) ? low : high;
-      count = &suspects_[value];
-      without.void_values.push_back(value);
-    } else {
-      break;
-    }
+    without.void_values.push_back(*end);
     part = {};
     scan_samples(without, raw, part);
-    if (count != nullptr) *count += before - part.valid;
+    add({*end, *end, before - part.valid});
   }
-  merge(others_, part);
+  if (part.valid > 0) add({part.range.min, part.range.max, part.valid});
+}
+
+void SourceSurvey::add(const Cluster& cluster) {
+  constexpr std::size_t kMostClusters = 16;
+  const auto join = [&](std::size_t i) {  // with the next
+    Cluster& low = clusters_[i];
+    const Cluster& high = clusters_[i + 1];
+    low = {low.low, std::max(low.high, high.high), low.count + high.count};
+    clusters_.erase(clusters_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+  };
+  const auto gap = [&](std::size_t i) { return clusters_[i + 1].low - clusters_[i].high; };
+  clusters_.insert(std::ranges::upper_bound(clusters_, cluster.low, {}, &Cluster::low), cluster);
+  for (std::size_t i = 0; i + 1 < clusters_.size();) gap(i) <= 0.0 ? join(i) : static_cast<void>(++i);
+  if (clusters_.size() <= kMostClusters) return;
+  std::size_t nearest = 0;
+  for (std::size_t i = 1; i + 1 < clusters_.size(); ++i) nearest = gap(i) < gap(nearest) ? i : nearest;
+  join(nearest);
 }
 
 SourceScan SourceSurvey::scan() const {
@@ -210,45 +227,56 @@ std::optional<double> SourceSurvey::mean() const {
   return sum_ / static_cast<double>(all_.valid) * z_scale_ + z_offset_;
 }
 
-std::vector<UndeclaredVoid> SourceSurvey::undeclared_voids() const {
-  std::vector<UndeclaredVoid> found;
-  if (others_.valid == 0) return found;
-  const auto add_huge = [&](const SourceScan& huge, double value) {
-    if (huge.valid > 0) found.push_back({value, huge.valid, huge.range.min != huge.range.max});
-  };
-  add_huge(huge_negative_, huge_negative_.range.min);
-  // Suspects that lie among the rest are part of it, the nearest first.
-  ElevationRange rest = others_.range;
-  std::vector<std::pair<double, std::int64_t>> suspects(suspects_.begin(), suspects_.end());
-  const auto distance = [&](double value) { return std::max(rest.min - value, value - rest.max); };
-  std::sort(suspects.begin(), suspects.end(),
-            [&](const auto& a, const auto& b) { return distance(a.first) < distance(b.first); });
-  for (const auto& [value, count] : suspects) {
-    if (distance(value) > std::max(rest.max - rest.min, 1.0)) {
-      found.push_back({value, count, false});
-    } else {
-      rest = {std::min(rest.min, value), std::max(rest.max, value)};
-    }
+/// `gap`  to the nearest other sample; `rest`  from the least to the greatest of the others.
+bool SourceSurvey::is_outlier(const Cluster& cluster, double gap, double rest) const {
+  constexpr double kHighLand = 10000.0;  // from the sea to the highest summit of the Earth, in metres
+  if (cluster.low != cluster.high) return false;
+  if (is_mark(cluster.low)) return gap > std::max(rest, 1.0);
+  return gap > 10.0 * rest && gap * std::abs(z_scale_) > kHighLand;
+}
+
+SourceSurvey::Outliers SourceSurvey::outliers() const {
+  Outliers found;
+  std::vector<Cluster> rest = clusters_;
+  while (rest.size() > 1) {
+    const Cluster first = rest.front();
+    const Cluster last = rest.back();
+    const bool is_first = is_outlier(first, rest[1].low - first.high, last.high - rest[1].low);
+    const double before_last = rest[rest.size() - 2].high;
+    const bool is_last = is_outlier(last, last.low - before_last, before_last - first.low);
+    if (!is_first && !is_last) break;
+    // Of two values alone the mark, else the rarer.
+    const auto rank = [](const Cluster& cluster) { return std::pair(!is_mark(cluster.low), cluster.count); };
+    const bool takes_first = is_first && (!is_last || rank(first) < rank(last));
+    found.voids.push_back({takes_first ? first.low : last.low, takes_first ? first.count : last.count});
+    rest.erase(takes_first ? rest.begin() : rest.end() - 1);
   }
-  add_huge(huge_positive_, huge_positive_.range.max);
+  std::ranges::sort(found.voids, {}, &UndeclaredVoid::value);
+  if (rest.empty()) return found;
+  const double a = rest.front().low * z_scale_ + z_offset_;
+  const double b = rest.back().high * z_scale_ + z_offset_;
+  found.others = {std::min(a, b), std::max(a, b)};
   return found;
 }
 
-std::string SourceSurvey::warning() const {
+std::string SourceSurvey::warning(const std::string& consequence) const {
   // A reader that counts on its own (ASCII grids, where text is parsed anyway) has said it.
   for (const Warning& warning : info_.warnings) {
-    if (warning.kind == Warning::Kind::kUndeclaredNodata) return {};
+    if (warning.kind == Warning::Kind::kUndeclaredNodata && consequence.empty()) return {};
   }
+  const auto [voids, others] = outliers();
   std::string values;
   std::vector<double> list;
-  for (const UndeclaredVoid& found : undeclared_voids()) {
+  for (const UndeclaredVoid& found : voids) {
     list.push_back(found.value);
-    values += fmt::format("{}{} samples hold {:.9g}{}", values.empty() ? "" : ", ", found.count, found.value,
-                          found.many_values ? " or the like" : "");
+    values += fmt::format("{}{} samples hold {}", values.empty() ? "" : ", ", found.count,
+                          shortest_text(info_.sample_type, found.value));
   }
   if (values.empty()) return {};
-  return fmt::format("{}, far from all others ({:.6g} to {:.6g}): if that means no elevation, give {}", values,
-                     others_.range.min, others_.range.max, void_values_with(info_, list));
+  const double a = (others.min - z_offset_) / z_scale_;
+  const double b = (others.max - z_offset_) / z_scale_;
+  return fmt::format("{}, far from all others ({:.6g} to {:.6g}){}: if that means no elevation, give {}", values,
+                     std::min(a, b), std::max(a, b), consequence, void_values_with(info_, list));
 }
 
 }  // namespace isohf

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -38,17 +37,16 @@ void scan_samples(const SourceInfo& info, std::span<const std::byte> raw, Source
 /// A raw value that looks like a mark for voids that the source does not declare.
 struct UndeclaredVoid {
   double value = 0.0;
-  std::int64_t count = 0;    ///< samples that hold it
-  bool many_values = false;  ///< `value` is but the outermost of several
+  std::int64_t count = 0;  ///< samples that hold it
 };
 
 /// What one pass over a whole source finds, whatever parts it comes in: range and counts, the mean where it is wanted,
 /// and voids that are not declared.
 ///
-/// A value counts as an undeclared void where it is one that files mark voids with (-32768, -32767, 32767, 65535,
-/// -9999, 9999, -99999, 99999, -999999, 999999; or anything from 1e30 on, on either side) and lies further from all
-/// other elevations than these lie from each other. Ordinary sources pay nothing for that: samples are looked at again
-/// only in parts whose smallest or largest is such a value.
+/// A value at an end of the range counts as an undeclared void if it lies far from all others: further than these lie
+/// from each other, if it is one that files mark voids with (-32768, -32767, 32767, 65535, -9999, 9999, -99999, 99999,
+/// -999999, 999999); else ten times as far, and further than land is high. Ordinary sources pay little for that: parts
+/// of a source have some sample in both halves of their range, and then nothing else is looked at.
 class SourceSurvey {
  public:
   /// with_mean: takes as long as the rest again.
@@ -63,23 +61,34 @@ class SourceSurvey {
   [[nodiscard]] SourceScan scan() const;
   /// Of all valid elevations; nullopt where there are none or it was not wanted.
   [[nodiscard]] std::optional<double> mean() const;
-  [[nodiscard]] std::vector<UndeclaredVoid> undeclared_voids() const;
-  /// One line on them for the user, without the path; empty where there are none.
-  [[nodiscard]] std::string warning() const;
+
+  struct Outliers {
+    std::vector<UndeclaredVoid> voids;  ///< in ascending order
+    ElevationRange others;              ///< elevations without them
+  };
+  [[nodiscard]] Outliers outliers() const;
+  /// One line on them for the user, without the path; empty where there are none. `consequence`  of keeping them.
+  [[nodiscard]] std::string warning(const std::string& consequence = {}) const;
 
  private:
-  void look_for_voids(std::span<const std::byte> raw, SourceScan part);
+  /// Samples from `low` to `high`, with none of the others between.
+  struct Cluster {
+    double low = 0.0;
+    double high = 0.0;
+    std::int64_t count = 0;
+  };
+
+  void find_clusters(std::span<const std::byte> raw, SourceScan part);
+  void add(const Cluster& cluster);
+  [[nodiscard]] bool is_outlier(const Cluster& cluster, double gap, double rest) const;
 
   SourceInfo info_;  ///< of raw samples: scale 1, offset 0
   double z_scale_ = 1.0;
   double z_offset_ = 0.0;
   bool with_mean_ = false;
   double sum_ = 0.0;
-  SourceScan all_;     ///< raw
-  SourceScan others_;  ///< raw, without the suspects
-  std::map<double, std::int64_t> suspects_;
-  SourceScan huge_negative_;
-  SourceScan huge_positive_;
+  SourceScan all_;                 ///< raw
+  std::vector<Cluster> clusters_;  ///< raw, in ascending order, a few: of many the nearest are joined
 };
 
 }  // namespace isohf

@@ -154,8 +154,7 @@ class Comparison {
             std::max(rows, std::min(bounds.most - bounds.least + 2.0 * kMostReach, static_cast<double>(info_.height)));
     }
     const double bytes = reading_bytes(job, static_cast<double>(grid_.shape().stored_vertex_count())) +
-                         static_cast<double>(source_.buffer_bytes()) + 2.0 * kBufferBytes +
-                         rows * width * 10.0 +
+                         static_cast<double>(source_.buffer_bytes()) + 2.0 * kBufferBytes + rows * width * 10.0 +
                          threads_of(job) * 8.0 * static_cast<double>(grid_.tile_columns() * grid_.shape().columns()) +
                          (warp_ ? 2.0 * tiles : 0.0);
     return scratch_for(job, bytes + tiles, bytes, "comparing");

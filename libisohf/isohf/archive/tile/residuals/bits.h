@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "isohf/base/bytes.h"
-#include "isohf/base/scratch.h"
+#include "isohf/base/memory/scratch.h"
 
 /// Numbers of some bits each, the lowest bit of a byte first.
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "isohf/archive/tile/tile_payload.h"
-#include "isohf/base/scratch.h"
+#include "isohf/base/memory/scratch.h"
 
 /// A tile's residuals, from the order in which they are coded to the streams in which they are stored.
 

@@ -1,3 +1,0 @@
-#pragma once
-
-#include "isohf/base/text.h"
