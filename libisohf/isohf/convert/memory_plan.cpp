@@ -16,6 +16,7 @@
 #include "isohf/convert/stages/seed_stage.h"
 #include "isohf/convert/stages/texture_stage.h"
 #include "isohf/error.h"
+#include "isohf/projection/crs/crs.h"
 #include "isohf/sampling/resample/kernels.h"
 #include "isohf/sampling/resample/prefilter.h"
 #include "isohf/sampling/source/band_reader.h"
@@ -131,6 +132,9 @@ class Estimate {
   }
 
   [[nodiscard]] std::uint64_t map_bytes() const {
+    // PROJ has read the system of a source that names one.
+    const ReferenceSystem& system = info_.georeference.system;
+    if (system.epsg || !system.wkt.empty()) return Crs::kProjBytes;
     const auto& map = options_.plan.ground.source_map;
     if (map && map->memory_bytes() > 0) return map->memory_bytes();
     const auto& world = options_.plan.ground.projection.system_map.map;

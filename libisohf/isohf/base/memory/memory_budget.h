@@ -8,7 +8,7 @@
 namespace isohf {
 
 /// Measured (docs/performance.md, decision 23): the program with its libraries and its pools of memory that was freed.
-inline constexpr double kProgramBytes = 21e6;
+inline constexpr double kProgramBytes = 19.5e6;
 inline constexpr double kThreadBytes = 0.7e6;
 /// In each thread, of each vertex of a tile that is decoded.
 inline constexpr double kDecodingBytesPerVertex = 60.0;
