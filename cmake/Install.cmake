@@ -1,4 +1,4 @@
-# What `cmake --install` lays down: the programs, the reader modules beside them, the library with its headers, and what
+# What `cmake --install` lays down: the programs, the reader module beside them, the library with its headers, and what
 # CMake (find_package(isohf)) and pkg-config need to find it.
 include(CMakePackageConfigHelpers)
 
@@ -9,7 +9,7 @@ install(TARGETS isohf_cli isohf_experiment RUNTIME DESTINATION ${CMAKE_INSTALL_B
 if(TARGET isohf_view)
   install(TARGETS isohf_view RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
 endif()
-# The reader modules are installed where they are built: formats/CMakeLists.txt.
+# The reader module is installed where it is built: formats/CMakeLists.txt.
 
 # Everything that `cmake --install` lays down, and no test: what scripts/quickstart builds.
 add_custom_target(installed DEPENDS isohf isohf_formats isohf_cli isohf_experiment manual)

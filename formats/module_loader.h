@@ -3,9 +3,6 @@
 #include <cstdint>
 #include <string>
 
-#include "isohf/error.h"
-#include "isohf/raster.h"
-
 namespace isohf {
 
 /// A module: a library of ours that is loaded only when it is needed, because of what it brings with it.
@@ -24,10 +21,5 @@ struct ModuleFile {
 
 /// The path of a file of ours that is looked for as modules are; empty where there is none.
 [[nodiscard]] std::string find_beside_program(const std::string& file);
-
-/// The code of a result other than 0 of a module's functions: they return one more than the code.
-[[nodiscard]] inline ErrorCode module_error_code(int result) {
-  return static_cast<ErrorCode>(result - 1);
-}
 
 }  // namespace isohf

@@ -70,7 +70,7 @@ extern const Format kRawFormat;
 /// does not know the format either.
 [[nodiscard]] std::unique_ptr<HeightSource> open_with_oiio(const std::string& path, const OpenOptions& options);
 
-/// The most bytes that the pixels of an interlaced PNG may take: 1 GiB.
+/// The most bytes that the pixels of a picture may take that is decoded whole, WebP or interlaced PNG: 1 GiB.
 inline constexpr std::uint64_t kMaxInterlacedBytes = std::uint64_t{1} << 30U;
 
 /// The most bytes that one decoded OpenEXR chunk (a block of scan lines or a tile, all channels) may have, in a file

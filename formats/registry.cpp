@@ -102,6 +102,10 @@ const Format* format_of_head(std::span<const std::byte> head) {
   return nullptr;
 }
 
+bool has_raster_extension(const std::string& path) {
+  return std::ranges::any_of(native_formats(), [&](const Format& format) { return has_extension(path, format); });
+}
+
 bool is_raster_in_folder(const std::string& path) {
   const std::filesystem::path file(path);
   std::string name = lower_case(file.filename().string());
@@ -116,7 +120,7 @@ bool is_raster_in_folder(const std::string& path) {
     return std::filesystem::exists(std::filesystem::path(path).replace_extension(extension), none);
   };
   if (name.ends_with(".lbl") && (has_image(".img") || has_image(".IMG") || has_image(".Img"))) return false;
-  return std::ranges::any_of(native_formats(), [&](const Format& format) { return has_extension(name, format); });
+  return has_raster_extension(name);
 }
 
 std::string library_of(const Format& format) {

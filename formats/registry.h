@@ -26,6 +26,9 @@ namespace isohf {
 /// What open_raster() opens, as its reader has it, before what is common to all is checked and the system completed.
 [[nodiscard]] std::unique_ptr<HeightSource> open_by_content(const std::string& path, const OpenOptions& options);
 
+/// Whether a file has the extension of a format read natively, packed or not.
+[[nodiscard]] bool has_raster_extension(const std::string& path);
+
 /// Whether a file of a folder is one of its rasters: by its extension, of archives by the names inside, of .dat by
 /// the header beside it. Headers and labels beside images are not.
 [[nodiscard]] bool is_raster_in_folder(const std::string& path);

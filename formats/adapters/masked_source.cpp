@@ -38,10 +38,7 @@ class MaskedSource final : public HeightSource {
                       "become {} (`void_values` V gives them one, `channel` 0 reads the image without them)",
                       to_string(stored_.type), to_string(samples_.kind.type)));
     }
-    info_.sample_type = samples_.kind.type;
-    info_.void_values = samples_.kind.void_values;
-    info_.valid_min = samples_.kind.valid_min;
-    info_.valid_max = samples_.kind.valid_max;
+    samples_.kind.put_into(info_);
     info_.block_height = std::max(info_.block_height, mask.block_height);
   }
 

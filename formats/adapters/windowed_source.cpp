@@ -5,18 +5,15 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "isohf/base/assert.h"
 #include "isohf/base/sample.h"
-#include "isohf/error.h"
 
 namespace isohf {
 namespace {
 
-/// `block`: samples along one axis; 0 or 1 where there are no blocks.
 Window all_but_the_last_column(const SourceInfo& info) {
   return {0, 0, info.width - 1, info.height};
 }

@@ -14,11 +14,6 @@
 namespace isohf {
 namespace {
 
-/// For messages, of what may be a WKT of any length.
-std::string shortened(const std::string& text) {
-  return one_line(text.size() > 60 ? text.substr(0, 60) + "..." : text);
-}
-
 /// The system of a file; null where it names none, or PROJ does not understand it.
 std::shared_ptr<const Crs> understood_if(const std::string& text) {
   try {
@@ -89,7 +84,7 @@ void complete_system(const std::string& text, SourceInfo& info) {
   Georeference& theirs = there.georeference;
   const std::string said = system_text(own.system);
   const bool is_wrong = is_impossible(info);
-  const std::string given = shortened(text);
+  const std::string given = shown_name({}, text);
   const std::string word = given.find_first_of(" \"") == std::string::npos ? given : "'" + given + "'";
   const std::string way_out = "if the file is wrong, correct a copy with gdal_translate -a_srs " + word;
   if (!is_wrong && !may_lie_in(own, theirs, *understood)) {

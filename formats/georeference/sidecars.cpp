@@ -52,7 +52,7 @@ std::vector<std::string> spellings(const std::vector<std::string>& extensions) {
 
 /// .jgw and .jpgw for .jpg: the first and last letter and a w, or all of them.
 std::vector<std::string> world_extensions(const std::string& raster_path) {
-  const std::string own = lower_case(std::filesystem::path(raster_path).extension().string());
+  const std::string own = extension_of(raster_path);
   if (own == ".flt") return {".flw", ".ftw", ".fltw", ".wld"};
   if (own.size() < 3 || own == ".tif" || own == ".tiff") return {".tfw", ".tifw", ".wld"};
   return {fmt::format(".{}{}w", own[1], own.back()), own + "w", ".wld"};

@@ -16,7 +16,6 @@
 #include <numbers>
 #include <optional>
 #include <string_view>
-#include <utility>
 
 #include "isohf/base/text/text.h"
 #include "isohf/error.h"

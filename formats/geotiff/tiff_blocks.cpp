@@ -254,7 +254,7 @@ void TiffBlocks::decode(const Unit& unit, TiffHandle& handle) const {
       continue;
     }
     std::byte* const to = is_direct ? unit.bytes : decoded.get();
-    handle.decode_block(block, layout_.tiled, {to, stored_bytes});
+    handle.decode_block(block, {to, stored_bytes});
     if (is_bits) {
       spread_bits(to, row_bytes, to_size(layout_.block_width), unit.bytes, pixels);
     } else if (!is_direct) {

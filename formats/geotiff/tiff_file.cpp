@@ -13,7 +13,6 @@
 
 #include "formats/geotiff/gdal_tags.h"
 #include "formats/io/file_stamp.h"
-#include "formats/readers.h"
 #include "isohf/base/text/text.h"
 #include "isohf/error.h"
 
@@ -82,6 +81,14 @@ void define_geotiff_tags() {
   }();
 }
 
+bool TiffLayout::is_grey() const {
+  return photometric == PHOTOMETRIC_MINISWHITE || photometric == PHOTOMETRIC_MINISBLACK;
+}
+
+bool TiffLayout::is_colour() const {
+  return photometric == PHOTOMETRIC_RGB || (photometric == PHOTOMETRIC_YCBCR && compression == COMPRESSION_JPEG);
+}
+
 double TiffLayout::block_row_bytes() const {
   return std::ceil(static_cast<double>(block_width) * static_cast<double>(interleaved()) * bits_per_sample / 8.0);
 }
@@ -139,8 +146,9 @@ std::string TiffHandle::text(std::uint32_t tag) const {
   return TIFFGetField(tiff_, tag, &characters) == 1 && characters != nullptr ? characters : "";
 }
 
-void TiffHandle::decode_block(std::uint64_t index, bool tiled, std::span<std::byte> bytes) {
+void TiffHandle::decode_block(std::uint64_t index, std::span<std::byte> bytes) {
   messages_ = {};
+  const bool tiled = TIFFIsTiled(tiff_) != 0;
   const auto block = static_cast<std::uint32_t>(index);
   const auto size = static_cast<tmsize_t>(bytes.size());
   const tmsize_t got = tiled ? TIFFReadEncodedTile(tiff_, block, bytes.data(), size)

@@ -38,6 +38,9 @@ struct TiffLayout {
   [[nodiscard]] std::uint64_t block_index(std::int64_t plane, std::int64_t across, std::int64_t down) const {
     return static_cast<std::uint64_t>((plane * blocks_down + down) * blocks_across + across);
   }
+  [[nodiscard]] bool is_grey() const;
+  /// RGB, or what libtiff decodes to it.
+  [[nodiscard]] bool is_colour() const;
   /// Samples of one pixel in a block.
   [[nodiscard]] std::int64_t interleaved() const { return separate ? 1 : samples_per_pixel; }
   /// Rows stored in block row `down`: tiles are whole, the last strip is cut.
@@ -87,7 +90,7 @@ class TiffHandle {
   ~TiffHandle();
 
   /// Decodes block `index` into host byte order; `bytes` is exactly its decoded size. Throws Error{kCorrupt}.
-  void decode_block(std::uint64_t index, bool tiled, std::span<std::byte> bytes);
+  void decode_block(std::uint64_t index, std::span<std::byte> bytes);
   /// Throws Error{kCorrupt} if the table of blocks has no such entry.
   [[nodiscard]] TiffBlockSpan block_span(std::uint64_t index);
 

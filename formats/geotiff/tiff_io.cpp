@@ -3,7 +3,6 @@
 #include <tiffio.h>
 
 #include <cstdio>
-#include <span>
 
 namespace isohf {
 namespace {

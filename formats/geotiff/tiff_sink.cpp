@@ -23,6 +23,7 @@
 #include "formats/geotiff/tiff_file.h"
 #include "formats/geotiff/tiff_io.h"
 #include "formats/write/encoders.h"
+#include "isohf/base/sample.h"
 #include "isohf/error.h"
 #include "isohf/raster.h"
 
@@ -40,12 +41,10 @@ struct TiffBlockRows {
 template <typename Unsigned>
 void difference_row(std::byte* row, std::size_t samples, std::size_t channels) {
   for (std::size_t at = samples; at-- > channels;) {
-    Unsigned value{};
-    Unsigned before{};
-    std::memcpy(&value, row + at * sizeof(Unsigned), sizeof(Unsigned));
-    std::memcpy(&before, row + (at - channels) * sizeof(Unsigned), sizeof(Unsigned));
-    value = static_cast<Unsigned>(value - before);
-    std::memcpy(row + at * sizeof(Unsigned), &value, sizeof(Unsigned));
+    const auto value = stored_at<Unsigned>(row + at * sizeof(Unsigned));
+    const auto before = stored_at<Unsigned>(row + (at - channels) * sizeof(Unsigned));
+    const auto difference = static_cast<Unsigned>(value - before);
+    std::memcpy(row + at * sizeof(Unsigned), &difference, sizeof(Unsigned));
   }
 }
 

@@ -70,15 +70,6 @@ class TiffMask final : public HeightSource {
   std::optional<TiffBlocks> blocks_;
 };
 
-bool is_grey(const TiffLayout& layout) {
-  return layout.photometric == PHOTOMETRIC_MINISWHITE || layout.photometric == PHOTOMETRIC_MINISBLACK;
-}
-
-bool is_colour(const TiffLayout& layout) {
-  return layout.photometric == PHOTOMETRIC_RGB ||
-         (layout.photometric == PHOTOMETRIC_YCBCR && layout.compression == COMPRESSION_JPEG);
-}
-
 SampleType sample_type_of(const TiffLayout& layout) {
   struct Row {
     int format;
@@ -115,7 +106,7 @@ SampleType sample_type_of(const TiffLayout& layout) {
 }
 
 void require_heights(const TiffLayout& layout, bool has_channel) {
-  if (is_grey(layout) || is_colour(layout)) return;
+  if (layout.is_grey() || layout.is_colour()) return;
   if (layout.photometric != PHOTOMETRIC_PALETTE) {
     throw Error(
         ErrorCode::kUnsupported,
@@ -239,22 +230,22 @@ class TiffSource final : public HeightSource {
     const auto name = [&](std::size_t at, const char* letter) {
       if (at < samples && names[at].empty()) names[at] = letter;
     };
-    if (is_grey(layout_)) name(0, "Y");
-    for (std::size_t i = 0; i < 3 && is_colour(layout_); ++i) name(i, std::array{"R", "G", "B"}[i]);
+    if (layout_.is_grey()) name(0, "Y");
+    for (std::size_t i = 0; i < 3 && layout_.is_colour(); ++i) name(i, std::array{"R", "G", "B"}[i]);
     if (layout_.alpha_sample > 0) name(static_cast<std::size_t>(layout_.alpha_sample), "A");
     OpenOptions chosen = options;
-    if (options.channel.empty() && is_colour(layout_) && has_equal_colours(info_.path, directory_, layout_)) {
+    if (options.channel.empty() && layout_.is_colour() && has_equal_colours(info_.path, directory_, layout_)) {
       info_.warnings.emplace_back("colour picture in greys: channel R is read");
       chosen.channel = "0";
       has_opacity_channel_ = layout_.alpha_sample == 3;
-    } else if (options.channel.empty() && is_colour(layout_) && layout_.bits_per_sample == 8) {
+    } else if (options.channel.empty() && layout_.is_colour() && layout_.bits_per_sample == 8) {
       throw Error(
           ErrorCode::kUnsupported,
           fmt::format(
               "is a colour picture of 8 bits; say which channel holds elevations (`channel` R), or how they are "
               "packed into all (`encoding` {})",
               kEncodings));
-    } else if (options.channel.empty() && is_grey(layout_) && samples == 2 && layout_.alpha_sample == 1) {
+    } else if (options.channel.empty() && layout_.is_grey() && samples == 2 && layout_.alpha_sample == 1) {
       chosen.channel = "0";
       has_opacity_channel_ = true;
     } else if (std::ranges::find(names, options.channel) == names.end()) {

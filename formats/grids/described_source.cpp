@@ -33,6 +33,12 @@ std::string read_header_text(const std::string& path) {
   return text;
 }
 
+void require_described(const std::string& path, const std::string& label, const std::string& data) {
+  std::error_code ignored;
+  if (std::filesystem::equivalent(path, data, ignored)) return;
+  throw Error(ErrorCode::kUnsupported, fmt::format("{}: its label {} describes {} instead", path, label, data));
+}
+
 HeaderWords read_header_words(const std::string& path) {
   const std::string text = read_header_text(path);
   HeaderWords words;

@@ -26,6 +26,9 @@ using HeaderWords = std::map<std::string, std::string, std::less<>>;
 /// The items of a list, "{a, b}" or "a, b", without the blanks around them.
 [[nodiscard]] std::vector<std::string> list_of(std::string_view text);
 
+/// Throws Error{kUnsupported} where the label that lies beside `path` describes other samples: those of `data`.
+void require_described(const std::string& path, const std::string& label, const std::string& data);
+
 /// Plain samples that something else describes: ENVI's header, PDS4's label and so on. Whoever derives from this
 /// reads the description into info_ and layout_ and calls finish().
 class DescribedSource : public PlainSource {

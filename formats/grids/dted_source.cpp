@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cstring>
 #include <optional>
@@ -11,6 +10,7 @@
 #include "formats/georeference/sidecars.h"
 #include "formats/grids/plain_samples.h"
 #include "formats/io/bands.h"
+#include "formats/io/raw_file.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "isohf/base/text/text.h"
@@ -121,8 +121,7 @@ class DtedSource final : public PlainSource {
   }
 
   void read_header() {
-    header_.resize(kTapeRecordBytes + 4);
-    header_.resize(file_->read_some(0, std::as_writable_bytes(std::span(header_))));
+    header_ = first_bytes(*file_, kTapeRecordBytes + 4);
     if (!header_.starts_with("UHL1")) header_at_ = kTapeRecordBytes;
     if (!kDtedFormat.recognises(std::as_bytes(std::span(header_))))
       fail(ErrorCode::kCorrupt, "has no user header label UHL1, must start with it");

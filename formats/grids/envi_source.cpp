@@ -6,12 +6,12 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "formats/georeference/sidecars.h"
 #include "formats/grids/described_source.h"
 #include "formats/io/bands.h"
+#include "formats/io/raw_file.h"
 #include "formats/readers.h"
 #include "isohf/base/text/text.h"
 #include "isohf/error.h"
@@ -172,9 +172,7 @@ class EnviSource final : public DescribedSource {
 };
 
 bool begins_with(const std::string& path, std::string_view wanted) {
-  std::string head(wanted.size(), '\0');
-  return is_file(path) && RawFile(path).read_some(0, std::as_writable_bytes(std::span(head))) == head.size() &&
-         head == wanted;
+  return is_file(path) && first_bytes(RawFile(path), wanted.size()) == wanted;
 }
 
 constexpr std::string_view kEnviData[] = {"", ".dat", ".img", ".bin", ".raw", ".bsq", ".bil", ".bip", ".flt", ".envi"};
@@ -182,7 +180,7 @@ constexpr std::string_view kEnviData[] = {"", ".dat", ".img", ".bin", ".raw", ".
 /// x.hdr, or x.dat.hdr where there is none: what else x.hdr says is said of the same samples.
 std::string envi_header_of(const std::string& path) {
   // Another file may have the name of the samples but for its extension.
-  const std::string own = lower_case(std::filesystem::path(path).extension().string());
+  const std::string own = extension_of(path);
   const bool is_data = std::ranges::find(kEnviData, own) != std::end(kEnviData);
   for (const bool is_replaced : {true, false}) {
     for (const char* extension : {".hdr", ".HDR"}) {

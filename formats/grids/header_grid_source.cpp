@@ -14,6 +14,7 @@
 #include "formats/grids/described_source.h"
 #include "formats/grids/grid_header.h"
 #include "formats/io/bands.h"
+#include "formats/io/raw_file.h"
 #include "formats/readers.h"
 #include "isohf/base/text/text.h"
 #include "isohf/error.h"
@@ -30,10 +31,6 @@ constexpr std::array<std::string_view, 21> kKnown = {
 
 bool is_known(std::string_view name) {
   return std::ranges::find(kKnown, GridHeader::plain_name(name)) != kKnown.end();
-}
-
-std::string extension_of(const std::string& path) {
-  return lower_case(std::filesystem::path(path).extension().string());
 }
 
 /// The first two words of a line, empty if it has fewer.

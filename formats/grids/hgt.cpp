@@ -14,7 +14,6 @@
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "formats/write/encoders.h"
-#include "isohf/base/bytes.h"
 #include "isohf/base/text/text.h"
 #include "isohf/error.h"
 #include "isohf/projection/crs/source_system.h"
@@ -53,6 +52,7 @@ std::optional<HgtCorner> hgt_corner_of(const std::string& path) {
 }
 
 constexpr std::int64_t kSampleBytes = 2;
+constexpr double kHgtVoid = -32768.0;
 
 struct Size {
   std::int64_t columns = 0;
@@ -92,7 +92,7 @@ class HgtSource final : public PlainSource {
     info_.width = size->columns;
     info_.height = size->rows;
     info_.sample_type = SampleType::kInt16;
-    info_.void_values = {-32768.0};
+    info_.void_values = {kHgtVoid};
     info_.vertical_unit = "metre";
     info_.block_width = info_.width;
     info_.block_height = 1;
@@ -121,8 +121,6 @@ class HgtSource final : public PlainSource {
     }
   }
 };
-
-constexpr double kHgtVoid = -32768.0;
 
 /// Big-endian int16, nothing else.
 class HgtEncoder final : public RasterEncoder {

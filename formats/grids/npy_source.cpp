@@ -11,7 +11,6 @@
 #include "formats/grids/described_source.h"
 #include "formats/grids/plain_samples.h"
 #include "formats/io/bands.h"
-#include "formats/io/file_source.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
 #include "isohf/base/text/text.h"

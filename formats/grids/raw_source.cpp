@@ -16,7 +16,6 @@
 #include "formats/io/raw_file.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
-#include "isohf/base/bytes.h"
 #include "isohf/base/handed_in.h"
 #include "isohf/base/sample.h"
 #include "isohf/base/text/text.h"
@@ -40,7 +39,7 @@ std::string layout_text(const RawLayout& layout) {
 /// Suggests a layout if the samples make a square.
 [[noreturn]] void refuse_without_layout(const std::string& path) {
   using enum SampleType;
-  const std::string ending = lower_case(std::filesystem::path(path).extension().string());
+  const std::string ending = extension_of(path);
   const auto bytes = static_cast<std::int64_t>(RawFile(path).size_bytes());
   std::vector<SampleType> types = {kUint16};
   if (ending == ".r8") types = {kUint8};

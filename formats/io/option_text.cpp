@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/io/raw_file.h"
 #include "isohf/base/output_file.h"
 #include "isohf/base/text/number_text.h"
 #include "isohf/base/text/text.h"
@@ -20,11 +21,10 @@ namespace isohf {
 
 std::string system_from(const std::string& text) {
   constexpr std::size_t kMostBytes = 65536;
-  std::error_code ignored;
   if (text.empty())
     throw Error(ErrorCode::kInvalidArgument, "found '', must be EPSG:2154, WKT, a PROJ string or a file");
-  if (!std::filesystem::is_regular_file(text, ignored)) {
-    const std::string extension = lower_case(std::filesystem::path(text).extension().string());
+  if (!is_file(text)) {
+    const std::string extension = extension_of(text);
     if (extension != ".prj" && extension != ".wkt" && extension != ".txt") return text;
     throw Error(ErrorCode::kInvalidArgument, "found '" + text + "', no such file");
   }

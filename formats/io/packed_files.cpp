@@ -12,7 +12,6 @@
 #include <exception>
 #include <filesystem>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "formats/io/raw_file.h"

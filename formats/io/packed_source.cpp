@@ -65,9 +65,7 @@ bool is_raster(const Member& member) {
                           [&](const char* other) { return name.ends_with(other); })) {
     return false;
   }
-  return std::ranges::any_of(native_formats(), [&](const Format& format) {
-    return std::ranges::any_of(format.extensions, [&](const char* extension) { return name.ends_with(extension); });
-  });
+  return has_raster_extension(name);
 }
 
 /// What is read of an archive, by name: `part`, or all that are rasters, pictures only where there is nothing else.
@@ -150,8 +148,9 @@ class Unpacked {
     }
     std::vector<bool> wanted(members.size());
     std::uint64_t bytes = 0;
+    const std::vector<const Member*> others = companions_in(members);
     for (const Member* raster : rasters) {
-      for (const Member* member : with_neighbours(*raster, members)) {
+      for (const Member* member : with_neighbours(*raster, others)) {
         wanted[static_cast<std::size_t>(member - members.data())] = true;
         bytes += member->bytes;
       }
@@ -171,15 +170,24 @@ class Unpacked {
     }
   }
 
-  /// The raster, and the files of its stem that lie beside it.
+  /// The files that say something of rasters.
+  [[nodiscard]] static std::vector<const Member*> companions_in(const std::vector<Member>& members) {
+    std::vector<const Member*> found;
+    for (const Member& member : members) {
+      if (!is_raster(member) && !member.ends_in(".ovr")) found.push_back(&member);
+    }
+    return found;
+  }
+
+  /// The raster, and those of the other files that lie beside it under its stem.
   [[nodiscard]] static std::vector<const Member*> with_neighbours(const Member& raster,
-                                                                  const std::vector<Member>& members) {
+                                                                  const std::vector<const Member*>& others) {
     const std::string stem = fs::path(raster.file_name()).stem().string() + '.';
     std::vector<const Member*> found = {&raster};
-    for (const Member& member : members) {
-      if (member.folder() == raster.folder() && member.file_name().starts_with(stem) && !is_raster(member) &&
-          !member.ends_in(".ovr") && found.size() <= kMostBeside && &member != &raster)
-        found.push_back(&member);
+    for (const Member* member : others) {
+      if (member->folder() == raster.folder() && member->file_name().starts_with(stem) && found.size() <= kMostBeside &&
+          member != &raster)
+        found.push_back(member);
     }
     return found;
   }

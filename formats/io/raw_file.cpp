@@ -3,8 +3,10 @@
 #include <fmt/core.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cstring>
 
+#include "isohf/base/text/text.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -41,6 +43,16 @@ void RawFile::read(std::uint64_t offset_bytes, std::span<std::byte> bytes) const
   if (got == bytes.size()) return;
   throw Error(ErrorCode::kCorrupt, fmt::format("{}: ends early: {} bytes wanted at byte {}, {} there", path(),
                                                bytes.size(), offset_bytes, got));
+}
+
+std::string first_bytes(const RawFile& file, std::uint64_t most_bytes) {
+  std::string bytes(static_cast<std::size_t>(std::min(file.size_bytes(), most_bytes)), '\0');
+  bytes.resize(file.read_some(0, std::as_writable_bytes(std::span(bytes))));
+  return bytes;
+}
+
+std::string extension_of(const std::string& path) {
+  return lower_case(std::filesystem::path(path).extension().string());
 }
 
 void swap_byte_order(std::span<std::byte> samples, std::size_t sample_bytes) {

@@ -37,6 +37,12 @@ class RawFile {
   std::uint64_t size_bytes_;  ///< when it was opened
 };
 
+/// The first `most_bytes` bytes of a file, fewer where it has fewer. Throws Error{kIo}.
+[[nodiscard]] std::string first_bytes(const RawFile& file, std::uint64_t most_bytes);
+
+/// ".tif" of dem.TIF, empty where a name has none.
+[[nodiscard]] std::string extension_of(const std::string& path);
+
 /// Turns the byte order of every sample of `sample_bytes` (1, 2, 4 or 8) in place.
 void swap_byte_order(std::span<std::byte> samples, std::size_t sample_bytes);
 

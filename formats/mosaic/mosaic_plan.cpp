@@ -18,6 +18,7 @@
 #include "formats/readers.h"
 #include "isohf/base/text/text.h"
 #include "isohf/error.h"
+#include "isohf/projection/body.h"
 #include "isohf/projection/choose_projection.h"
 #include "isohf/projection/crs/crs.h"
 #include "isohf/projection/crs/crs_operation.h"
@@ -312,12 +313,7 @@ class Joining {
         ground.east = std::remainder(ground.east, 360.0);
       }
       WayToSystem way = find_way(systems_[i].system, target, ground, ellipsoid(i));
-      if (way.is_ballpark) {
-        whole.warnings.push_back(
-            loss(fmt::format("PROJ knows no way from the datum of {} to that of \"{}\": they are taken for one, which "
-                             "may be off by some hundred metres",
-                             name_of(systems_[i]), way.system.name)));
-      }
+      if (way.is_ballpark) whole.warnings.push_back(loss(ballpark_note("the datum of " + name_of(systems_[i]), way)));
       ways[i] = std::make_shared<MosaicWay>(MosaicWay{std::move(way.map), maps_[i]});
     }
     Georeference& place = whole.georeference;
@@ -349,10 +345,7 @@ class Joining {
   }
 
   [[nodiscard]] Ellipsoid ellipsoid(std::size_t i) const {
-    if (maps_[i]) return maps_[i]->ellipsoid();
-    const ReferenceSystem& system = systems_[i].system;
-    if (!system.semi_major_axis_m) return {};
-    return {*system.semi_major_axis_m, system.inverse_flattening.value_or(0.0)};
+    return maps_[i] ? maps_[i]->ellipsoid() : ellipsoid_of(systems_[i].system);
   }
 
   const std::vector<Georeference>& systems_;
@@ -403,8 +396,7 @@ void open_all(const std::vector<std::string>& paths, const OpenOptions& options,
     std::exception_ptr failure;
   };
   plan.readers_at_once = oneapi::tbb::this_task_arena::max_concurrency();
-  OpenOptions share = options;
-  share.buffer_bytes /= static_cast<std::uint64_t>(plan.readers_at_once);
+  const OpenOptions share = share_of(options, plan);
   const std::size_t at_once = std::min(kOpenedAtOnce, most_open_rasters());
   for (std::size_t from = 0; from < paths.size(); from += at_once) {
     std::vector<Opened> opened(std::min(at_once, paths.size() - from));
@@ -461,13 +453,7 @@ void complete(MosaicPlan& plan, const Window& region) {
                                             : "the files differ in reference system";
   plan.samples = choose_mosaic_samples(plan.kinds, plan.samples_missing > 0 || plan.is_reprojected, why);
   SourceInfo& info = plan.info;
-  const SampleKind& kind = plan.samples.kind;
-  info.sample_type = kind.type;
-  info.void_values = kind.void_values;
-  info.valid_min = kind.valid_min;
-  info.valid_max = kind.valid_max;
-  info.z_scale = kind.z_scale;
-  info.z_offset = kind.z_offset;
+  plan.samples.kind.put_into(info);
   for (const SampleKind& of_files : plan.kinds) {
     info.void_values_of_files.insert(info.void_values_of_files.end(), of_files.void_values.begin(),
                                      of_files.void_values.end());
@@ -480,6 +466,11 @@ void complete(MosaicPlan& plan, const Window& region) {
 }
 
 }  // namespace
+
+OpenOptions share_of(OpenOptions options, const MosaicPlan& plan) {
+  options.buffer_bytes /= static_cast<std::uint64_t>(plan.readers_at_once);
+  return options;
+}
 
 MosaicPlan plan_mosaic(const std::vector<std::string>& paths, const OpenOptions& options,
                        const std::optional<BoundingBox>& box, const ProjectionRequest& onto) {

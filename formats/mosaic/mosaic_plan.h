@@ -60,7 +60,7 @@ struct MosaicLayer {
 
 /// Many rasters as one: where each lies, and what samples the whole has.
 struct MosaicPlan {
-  SourceInfo info;  ///< of the whole; path and block_height are left to the source
+  SourceInfo info;  ///< of the whole; the path for messages, block_height not yet
   std::vector<SampleKind> kinds;
   MosaicSamples samples;
   /// From the coarsest to the finest, the order in which they are laid over each other. A layer that has the mosaic's
@@ -121,11 +121,12 @@ void place_members(std::vector<PlacedMember> members, MosaicPlan& plan);
 /// Counts samples of `region` without a member; warns of them, and of members that lie over exactly the same ground.
 void check_coverage(MosaicPlan& plan, const Window& region);
 
-/// The part of a span of `samples` from `first` on that lies in [window_first, window_first + window_count).
+/// Samples [first, first + count) along one axis.
 struct Span {
   std::int64_t first = 0;
   std::int64_t count = 0;
 };
+/// What lies in both.
 [[nodiscard]] Span intersection(Span a, Span b);
 
 /// Opens every file once, in parallel, and places it by its georeference. The grid is the finest among the members';
@@ -143,6 +144,9 @@ struct Span {
 
 /// The same of rasters whose positions `list` states.
 [[nodiscard]] MosaicPlan plan_mosaic(const ListedMosaic& list, const OpenOptions& options);
+
+/// As the members' readers are opened: as many as threads read, each with its share of the buffers.
+[[nodiscard]] OpenOptions share_of(OpenOptions options, const MosaicPlan& plan);
 
 /// How many rasters may be open at once: 64, or fewer if the system allows the process few open files.
 [[nodiscard]] std::size_t most_open_rasters();

@@ -74,6 +74,15 @@ SampleKind SampleKind::of(const SourceInfo& info) {
   return {info.sample_type, info.void_values, info.valid_min, info.valid_max, info.z_scale, info.z_offset};
 }
 
+void SampleKind::put_into(SourceInfo& info) const {
+  info.sample_type = type;
+  info.void_values = void_values;
+  info.valid_min = valid_min;
+  info.valid_max = valid_max;
+  info.z_scale = z_scale;
+  info.z_offset = z_offset;
+}
+
 MosaicSamples choose_mosaic_samples(const std::vector<SampleKind>& kinds, bool gaps, const char* why_interpolated) {
   ISOHF_ASSERT(!kinds.empty());
   const SampleKind& first = kinds.front();

@@ -18,6 +18,7 @@ struct SampleKind {
   double z_offset = 0.0;
 
   [[nodiscard]] static SampleKind of(const SourceInfo& info);
+  void put_into(SourceInfo& info) const;
   friend bool operator==(const SampleKind& a, const SampleKind& b) = default;
 };
 

@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "formats/io/file_source.h"
 #include "isohf/base/assert.h"
 #include "isohf/raster.h"
 
@@ -30,12 +31,6 @@ constexpr double kAtSample = 1e-6;
 constexpr std::int32_t kNoFile = -1;
 
 constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
-
-/// As the members' readers are opened: as many as threads read, each its share.
-OpenOptions share_of(OpenOptions options, const MosaicPlan& plan) {
-  options.buffer_bytes /= static_cast<std::uint64_t>(plan.readers_at_once);
-  return options;
-}
 
 /// Rows of a strip: whole rows of members if these are not too large, else whole rows of their blocks.
 std::int64_t strip_rows(const MosaicPlan& plan) {
@@ -283,9 +278,7 @@ std::size_t MosaicSource::bytes_of(const Window& window) const {
 
 void MosaicSource::read_window(const Window& window, std::span<std::byte> samples) {
   const SourceInfo& info = plan_.info;
-  ISOHF_ASSERT(window.column >= 0 && window.row >= 0 && window.columns >= 0 && window.rows >= 0);
-  ISOHF_ASSERT(window.column + window.columns <= info.width && window.row + window.rows <= info.height);
-  ISOHF_ASSERT(samples.size() == bytes_of(window));
+  ISOHF_ASSERT(is_window_of(info, window, samples.size()));
   // Passes read the same columns again and again; the first window of others is read as it is.
   const bool is_first_of_whole = strip_.columns == 0 && window.columns == info.width;
   const bool follows = is_first_of_whole || (window.column == strip_.column && window.columns == strip_.columns);

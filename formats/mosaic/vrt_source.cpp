@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -18,11 +17,11 @@
 #include "formats/geotiff/gdal_tags.h"
 #include "formats/io/bands.h"
 #include "formats/io/packed_files.h"
+#include "formats/io/raw_file.h"
 #include "formats/io/text_tokens.h"
 #include "formats/mosaic/mosaic_source.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
-#include "isohf/base/file.h"
 #include "isohf/base/text/text.h"
 #include "isohf/error.h"
 #include "isohf/projection/crs/crs.h"
@@ -32,8 +31,6 @@ namespace {
 
 constexpr std::uint64_t kLongestVrt = std::uint64_t{256} << 20U;
 constexpr double kMostSide = 1e9;
-/// Begins the names of folders in which archives are unpacked.
-constexpr const char* kUnpacked = "/isohf-unpacked";
 /// Of a sample: positions in a VRT are written in decimals.
 constexpr double kOnTheGrid = 1e-3;
 
@@ -45,10 +42,9 @@ class VrtReader {
   }
 
   [[nodiscard]] std::unique_ptr<HeightSource> open() {
-    const File file(path_, File::Mode::kRead);
-    std::string text(static_cast<std::size_t>(std::min(file.size_bytes(), kLongestVrt + 1)), '\0');
-    if (text.size() > kLongestVrt) fail(ErrorCode::kUnsupported, "is larger than 256 MiB");
-    text.resize(file.read_at(0, std::as_writable_bytes(std::span(text))));
+    const RawFile file(path_);
+    if (file.size_bytes() > kLongestVrt) fail(ErrorCode::kUnsupported, "is larger than 256 MiB");
+    std::string text = first_bytes(file, kLongestVrt);
     pugi::xml_document document;
     const pugi::xml_parse_result parsed = document.load_buffer_inplace(text.data(), text.size());
     if (!parsed)
@@ -180,10 +176,9 @@ class VrtReader {
   }
 
   static bool is_vrt(const std::string& path) {
-    std::error_code none;
-    if (!std::filesystem::is_regular_file(path, none)) return path.ends_with(".vrt");
-    std::array<std::byte, 512> head{};
-    return kVrtFormat.recognises(std::span(head).first(File(path, File::Mode::kRead).read_at(0, head)));
+    if (!is_file(path)) return path.ends_with(".vrt");
+    const std::string head = first_bytes(RawFile(path), 512);
+    return kVrtFormat.recognises(std::as_bytes(std::span(head)));
   }
 
   /// The channel and the nodata of the files, by what the first of them has.

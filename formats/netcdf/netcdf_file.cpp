@@ -7,7 +7,6 @@
 #include <array>
 #include <mutex>
 
-#include "formats/readers.h"
 #include "isohf/base/text/text.h"
 #include "isohf/error.h"
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <utility>
 #include <vector>
 
 #include "formats/georeference/sidecars.h"
@@ -64,8 +63,7 @@ class OiioRows final : public PhotoRows {
     }
     kept_ = info.channels = photo_channels(picture_->channels, picture_->alpha, info);
     info.random_access = found.block_width < found.width;
-    const std::int64_t step = found.block_height;
-    info.block_height = std::min(std::max<std::int64_t>(info.block_height / step, 1) * step, info.height);
+    read_whole_blocks(found.block_height, info);
   }
 
   void read(std::int64_t row, std::int64_t rows, std::span<std::uint8_t> samples) override {

@@ -4,7 +4,6 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <mutex>
 #include <optional>
@@ -89,14 +88,13 @@ class CachedPhoto final : public PhotoSource {
   std::optional<BlockCache> bands_;
 };
 
-std::unique_ptr<PhotoRows> open_rows(PhotoInfo& info) {
-  std::array<std::byte, 16> bytes{};
-  const std::span head(bytes.data(), RawFile(info.path).read_some(0, bytes));
+std::unique_ptr<PhotoRows> open_rows(const RawFile& file, PhotoInfo& info) {
+  const std::string begin = first_bytes(file, 16);
+  const auto head = std::as_bytes(std::span(begin));
   if (kPngFormat.recognises(head)) return open_png_rows(info);
   if (looks_like_webp(head)) return open_webp_rows(info);
   if (kTiffFormat.recognises(head)) return open_tiff_rows(info);
-  constexpr std::array<std::byte, 3> kJpeg = {std::byte{0xFF}, std::byte{0xD8}, std::byte{0xFF}};
-  if (head.size() > kJpeg.size() && std::equal(kJpeg.begin(), kJpeg.end(), head.begin())) return open_jpeg_rows(info);
+  if (head.size() > 3 && begin.starts_with("\xFF\xD8\xFF")) return open_jpeg_rows(info);
   return open_oiio_rows(info);
 }
 
@@ -124,6 +122,11 @@ int photo_channels(int stored, int alpha, PhotoInfo& info) {
   return 3;
 }
 
+void read_whole_blocks(std::int64_t block_rows, PhotoInfo& info) {
+  const std::int64_t blocks = std::max<std::int64_t>(info.block_height / block_rows, 1);
+  info.block_height = std::min(blocks * block_rows, info.height);
+}
+
 void note_orientation(int orientation, PhotoInfo& info) {
   if (orientation <= 1 || orientation > 8) return;
   info.warnings.push_back(fmt::format(
@@ -137,8 +140,7 @@ void photo_samples(SampleType type, std::span<const std::byte> raw, int stored, 
     const std::byte* at = raw.data();
     for (std::size_t i = 0; i < samples.size(); at += sizeof(T) * static_cast<std::size_t>(stored)) {
       for (int channel = 0; channel < kept; ++channel, ++i) {
-        T value{};
-        std::memcpy(&value, at + sizeof(T) * static_cast<std::size_t>(channel), sizeof(T));
+        const auto value = stored_at<T>(at + sizeof(T) * static_cast<std::size_t>(channel));
         if constexpr (sizeof(T) == 1) {
           samples[i] = static_cast<std::uint8_t>(value);
         } else if constexpr (std::is_same_v<T, std::uint16_t>) {
@@ -160,9 +162,9 @@ std::unique_ptr<PhotoSource> open_photo(const std::string& path) {
   PhotoInfo info;
   info.path = path;
   info.block_height = kBandRows;
-  const RawFile is_there(path);
+  const RawFile file(path);
   try {
-    std::unique_ptr<PhotoRows> rows = open_rows(info);
+    std::unique_ptr<PhotoRows> rows = open_rows(file, info);
     info.pixel_bytes = static_cast<std::uint64_t>(info.channels);
     find_georeference(info);
     return std::make_unique<CachedPhoto>(std::move(info), std::move(rows));

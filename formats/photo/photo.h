@@ -44,6 +44,8 @@ class DecodedRows final : public PhotoRows {
 /// The channels delivered of a picture that has `stored`, of which number `alpha` is opacity (-1: none is): as many, or
 /// 3 of 4 with a warning. Throws Error{kUnsupported}.
 [[nodiscard]] int photo_channels(int stored, int alpha, PhotoInfo& info);
+/// Makes a band of rows whole rows of blocks of `block_rows`, one at least.
+void read_whole_blocks(std::int64_t block_rows, PhotoInfo& info);
 /// Warns if a picture's orientation tag (TIFF 6.0) asks for turning it.
 void note_orientation(int orientation, PhotoInfo& info);
 /// Samples of uint8, uint16, float16 or float32 as 8 bits, rounded; `is_light`: floats are light, but for a fourth

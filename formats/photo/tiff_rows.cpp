@@ -44,8 +44,7 @@ class TiffRows final : public PhotoRows {
     const TiffLayout layout = image.handle->read_layout();
     describe(*image.handle, layout, info);
     info.random_access = layout.tiled || layout.block_height < layout.height;
-    const std::int64_t unit = layout.block_height;
-    info.block_height = std::min(std::max<std::int64_t>(info.block_height / unit, 1) * unit, layout.height);
+    read_whole_blocks(layout.block_height, info);
     width_ = layout.width;
     constexpr std::uint64_t kNoCache = 0;  // whole rows of blocks are read
     blocks_.emplace(info.path, layout, std::move(image), TiffBlocks::kAllSamples, kNoCache);
@@ -79,9 +78,7 @@ class TiffRows final : public PhotoRows {
       }
       palette_ = handle.read_palette();
     }
-    const bool is_read = inverted_ || !palette_.empty() || layout.photometric == PHOTOMETRIC_MINISBLACK ||
-                         layout.photometric == PHOTOMETRIC_RGB ||
-                         (layout.photometric == PHOTOMETRIC_YCBCR && layout.compression == COMPRESSION_JPEG);
+    const bool is_read = !palette_.empty() || layout.is_grey() || layout.is_colour();
     kept_ = photo_channels(stored_, layout.alpha_sample, info);
     if (!is_read) refuse(fmt::format("has colours of TIFF's photometric interpretation {}", layout.photometric));
     type_ = sample_type_of(layout);

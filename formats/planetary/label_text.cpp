@@ -293,9 +293,7 @@ void LabelBlock::refuse(std::string_view key, const std::string& required) const
 }
 
 LabelText read_label(const std::string& path) {
-  const RawFile file(path);
-  std::string text(static_cast<std::size_t>(std::min<std::uint64_t>(file.size_bytes(), kMostLabelBytes)), '\0');
-  text.resize(file.read_some(0, std::as_writable_bytes(std::span(text))));
+  const std::string text = first_bytes(RawFile(path), kMostLabelBytes);
   return Parser(path, text).parse();
 }
 

@@ -17,6 +17,7 @@
 #include "formats/georeference/sidecars.h"
 #include "formats/grids/described_source.h"
 #include "formats/io/bands.h"
+#include "formats/io/raw_file.h"
 #include "formats/planetary/label_text.h"
 #include "formats/planetary/planetary_system.h"
 #include "formats/readers.h"
@@ -401,8 +402,8 @@ class Pds3Source final : public DescribedSource {
 };
 
 bool begins_with_label(const std::string& path) {
-  std::array<std::byte, 128> head = {};
-  return kPds3Format.recognises(std::span(head).first(RawFile(path).read_some(0, head)));
+  const std::string head = first_bytes(RawFile(path), 128);
+  return kPds3Format.recognises(std::as_bytes(std::span(head)));
 }
 
 /// The label beside a file of samples, NAME.lbl or, of JPEG 2000, NAME_jp2.lbl, in any case; empty where there is none.
@@ -428,18 +429,19 @@ bool looks_like_pds3(std::span<const std::byte> head) {
   return text.starts_with("PDS_VERSION_ID");
 }
 
+/// The label of samples that carry none themselves; empty for other files.
+std::string pds3_label_of(const std::string& path) {
+  return lower_case(path).ends_with(".img") && !begins_with_label(path) ? label_beside(path) : std::string();
+}
+
 bool has_pds3_label(const std::string& path) {
-  return lower_case(path).ends_with(".img") && !begins_with_label(path) && !label_beside(path).empty();
+  return !pds3_label_of(path).empty();
 }
 
 std::unique_ptr<HeightSource> open_pds3(const std::string& path, const OpenOptions& options) {
-  const std::string label = has_pds3_label(path) ? label_beside(path) : std::string();
+  const std::string label = pds3_label_of(path);
   const Product product = read_product(label.empty() ? path : label);
-  std::error_code ignored;
-  if (!label.empty() && !std::filesystem::equivalent(path, product.data, ignored)) {
-    throw Error(ErrorCode::kUnsupported,
-                fmt::format("{}: its label {} describes {} instead", path, label, product.data));
-  }
+  if (!label.empty()) require_described(path, label, product.data);
   return std::make_unique<Pds3Source>(product, options);
 }
 

@@ -8,12 +8,12 @@
 #include <pugixml.hpp>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "formats/georeference/sidecars.h"
 #include "formats/grids/described_source.h"
 #include "formats/io/bands.h"
+#include "formats/io/raw_file.h"
 #include "formats/io/text_tokens.h"
 #include "formats/planetary/planetary_system.h"
 #include "formats/readers.h"
@@ -267,16 +267,17 @@ class Pds4Source final : public DescribedSource {
 bool is_label(const std::string& path) {
   if (!is_file(path)) return false;
   const RawFile file(path);
-  std::string text(kLongestProlog, '\0');
-  text.resize(file.read_some(0, std::as_writable_bytes(std::span(text))));
-  return text.find("<?xml") < 8 && text.find(kProduct) != std::string::npos;
+  // Asked of every file that has no signature: what is no XML shows so at once.
+  constexpr std::uint64_t kDeclarationEnds = 12;
+  return first_bytes(file, kDeclarationEnds).find("<?xml") != std::string::npos &&
+         first_bytes(file, kLongestProlog).find(kProduct) != std::string::npos;
 }
 
 /// NAME.xml of NAME.img; empty where there is none.
 std::string label_of(const std::string& path) {
   static constexpr std::array<std::string_view, 5> kData = {".img", ".dat", ".raw", ".bin", ".cub"};
   const std::filesystem::path name(path);
-  if (std::ranges::find(kData, lower_case(name.extension().string())) == kData.end()) return {};
+  if (std::ranges::find(kData, extension_of(path)) == kData.end()) return {};
   for (const char* extension : {".xml", ".lblx"}) {
     const std::string label = file_beside(path, name.stem().string() + extension);
     if (!label.empty() && is_label(label)) return label;
@@ -295,11 +296,7 @@ bool is_pds4(const std::string& path) {
 std::unique_ptr<HeightSource> open_pds4(const std::string& path, const OpenOptions& options) {
   const std::string beside = label_of(path);
   const Label label(beside.empty() ? path : beside);
-  std::error_code ignored;
-  if (!beside.empty() && !std::filesystem::equivalent(path, label.data, ignored)) {
-    throw Error(ErrorCode::kUnsupported,
-                fmt::format("{}: its label {} describes {} instead", path, label.path, label.data));
-  }
+  if (!beside.empty()) require_described(path, label.path, label.data);
   return std::make_unique<Pds4Source>(label, options);
 }
 

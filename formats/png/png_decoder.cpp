@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "formats/readers.h"
-#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
 namespace isohf {

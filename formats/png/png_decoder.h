@@ -109,7 +109,7 @@ class WebpDecoder final : public PictureDecoder {
 /// path: kIo; kCorrupt; kUnsupported for an interlaced picture of more than kMaxInterlacedBytes.
 class PictureRows {
  public:
-  /// `format`  "PNG" or "WebP", for messages.
+  /// `format`  "PNG", "WebP" or "JPEG", for messages.
   PictureRows(std::string path, std::string format, std::unique_ptr<PictureDecoder> decoder, PictureDecoder::For use);
 
   [[nodiscard]] const PngHeader& header() const { return header_; }

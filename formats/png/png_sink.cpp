@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "formats/write/encoders.h"
-#include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
 namespace isohf {

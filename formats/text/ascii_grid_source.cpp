@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -13,6 +12,7 @@
 #include "formats/grids/grid_header.h"
 #include "formats/io/bands.h"
 #include "formats/io/file_source.h"
+#include "formats/io/raw_file.h"
 #include "formats/io/text_tokens.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
@@ -71,8 +71,7 @@ class AsciiGridSource final : public FileSource {
 
   /// Leaves the first word of the numbers in `word`; false if there is none.
   bool read_header(GridHeader& header, std::string_view& word) {
-    std::string begin(3, '\0');
-    begin.resize(file_->read_some(0, std::as_writable_bytes(std::span(begin))));
+    const std::string begin = first_bytes(*file_, 3);
     words_.seek(begin.size() - without_byte_order_mark(begin).size());
     while (words_.next(word)) {
       double special = 0.0;

@@ -15,6 +15,7 @@
 #include "formats/georeference/sidecars.h"
 #include "formats/grids/plain_samples.h"
 #include "formats/io/bands.h"
+#include "formats/io/raw_file.h"
 #include "formats/io/text_tokens.h"
 #include "formats/open_options.h"
 #include "formats/readers.h"
@@ -469,8 +470,7 @@ bool looks_like_xyz(std::span<const std::byte> head) {
 
 bool is_xyz(const std::string& path) {
   if (!lower_case(path).ends_with(".xyz")) return false;
-  std::string text(512, '\0');
-  text.resize(RawFile(path).read_some(0, std::as_writable_bytes(std::span(text))));
+  const std::string text = first_bytes(RawFile(path), 512);
   const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 && (c < '\t' || c > '\r'); };
   return std::ranges::none_of(text, is_control);
 }

@@ -10,7 +10,6 @@
 #include <span>
 
 #include "formats/png/packed_elevations.h"
-#include "formats/readers.h"
 #include "isohf/base/bytes.h"
 #include "isohf/base/text/text.h"
 

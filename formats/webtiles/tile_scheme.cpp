@@ -2,14 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <pugixml.hpp>
-#include <span>
 #include <string>
 
-#include "isohf/base/file.h"
+#include "formats/io/raw_file.h"
 #include "isohf/error.h"
 
 namespace isohf {
@@ -48,11 +46,8 @@ TileScheme tile_scheme_of(const std::filesystem::path& folder) {
   std::string found_in;
   for (const char* name : {"tilemapresource.xml", "metadata.json", "tiles.json", "tile.json", "tilejson.json"}) {
     const std::string path = (folder / name).string();
-    std::error_code none;
-    if (!std::filesystem::is_regular_file(path, none)) continue;
-    const File file(path, File::Mode::kRead);
-    std::string text(static_cast<std::size_t>(std::min(file.size_bytes(), kMostBytes)), '\0');
-    text.resize(file.read_at(0, std::as_writable_bytes(std::span(text))));
+    if (!is_file(path)) continue;
+    const std::string text = first_bytes(RawFile(path), kMostBytes);
     const auto stated = path.ends_with(".xml") ? scheme_in_xml(path, text) : scheme_in_json(text);
     if (!stated) continue;
     if (found && found != stated) {

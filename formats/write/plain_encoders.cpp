@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <iterator>
@@ -9,7 +8,6 @@
 #include <vector>
 
 #include "formats/write/encoders.h"
-#include "isohf/base/bytes.h"
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
 

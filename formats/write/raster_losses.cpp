@@ -16,10 +16,11 @@ std::vector<Warning> losses_of(const std::string& path, const RasterSpec& spec) 
     add(fmt::format("has no place for what its raw numbers mean: elevation = raw * {} + {}", spec.z_scale,
                     spec.z_offset));
   }
-  const bool states_unit = traits.states_scale || std::ranges::any_of(sidecars_of(path, spec), [](const Sidecar& file) {
-                             return file.path.ends_with(".aux.xml");
-                           });
-  if (spec.metres_per_vertical_unit != 1.0 && !states_unit) {
+  const auto has_statistics = [&] {
+    return std::ranges::any_of(sidecars_of(path, spec),
+                               [](const Sidecar& file) { return file.path.ends_with(".aux.xml"); });
+  };
+  if (spec.metres_per_vertical_unit != 1.0 && !traits.states_scale && !has_statistics()) {
     add(fmt::format("has no place for the unit of its elevations, {}: readers take them for metres",
                     spec.vertical_unit));
   }

@@ -10,6 +10,7 @@
 
 #include "formats/georeference/gdal_unit.h"
 #include "formats/georeference/sidecars.h"
+#include "formats/io/raw_file.h"
 #include "formats/write/encoders.h"
 #include "isohf/base/output_file.h"
 #include "isohf/base/text/text.h"
@@ -18,10 +19,6 @@
 
 namespace isohf {
 namespace {
-
-std::string extension_of(const std::string& path) {
-  return lower_case(std::filesystem::path(path).extension().string());
-}
 
 std::string beside(const std::string& path, const char* extension) {
   return std::filesystem::path(path).replace_extension(extension).string();

@@ -8,6 +8,7 @@
 #include <limits>
 #include <span>
 
+#include "formats/io/raw_file.h"
 #include "formats/readers.h"
 #include "formats/write/encoders.h"
 #include "isohf/base/file.h"
@@ -97,7 +98,7 @@ auto naming(const std::string& path, const Action& action) {
 
 const Writer& writer_for(const std::string& path) {
   if (path == "-") static_cast<void>(output_place(path, true));  // says why before the extension is looked at
-  const std::string extension = lower_case(std::filesystem::path(path).extension().string());
+  const std::string extension = extension_of(path);
   for (const Writer& writer : writers()) {
     if (std::ranges::count(writer.format.extensions, extension) > 0) return writer;
   }

@@ -31,7 +31,6 @@ class RasterSink {
   RasterSink& operator=(const RasterSink&) = delete;
   ~RasterSink();
 
-  [[nodiscard]] const RasterSpec& spec() const { return spec_; }
   /// The raster, and the files that stand beside it.
   [[nodiscard]] std::vector<std::string> files() const;
 

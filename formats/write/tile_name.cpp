@@ -13,9 +13,8 @@ namespace {
 std::optional<std::int64_t> tile_number(std::string_view digits) {
   std::int64_t number = 0;
   const auto [end, failure] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
-  const bool is_whole = failure == std::errc() && end == digits.data() + digits.size() && number >= 0;
-  const bool is_usual = !digits.empty() && (digits == "0" || (digits.front() != '0' && digits.front() != '-'));
-  return is_whole && is_usual ? std::optional(number) : std::nullopt;
+  const bool is_number = failure == std::errc() && number >= 0 && fmt::to_string(number) == digits;
+  return is_number ? std::optional(number) : std::nullopt;
 }
 
 }  // namespace

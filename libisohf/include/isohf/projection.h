@@ -130,8 +130,6 @@ class ReferenceMap {
   [[nodiscard]] virtual MapPoint map_from_geo(GeoPoint place) const = 0;
   [[nodiscard]] virtual double metres_per_unit() const = 0;
   [[nodiscard]] virtual const Ellipsoid& ellipsoid() const = 0;
-  /// What holds it in memory, libraries that were loaded for it included.
-  [[nodiscard]] virtual std::uint64_t memory_bytes() const { return 0; }
 };
 
 /// What lies under a rectangle of a map.

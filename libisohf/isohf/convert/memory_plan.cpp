@@ -132,13 +132,10 @@ class Estimate {
   }
 
   [[nodiscard]] std::uint64_t map_bytes() const {
-    // PROJ has read the system of a source that names one.
+    // PROJ has read the system that the source names, or the one that it is projected to.
     const ReferenceSystem& system = info_.georeference.system;
-    if (system.epsg || !system.wkt.empty()) return Crs::kProjBytes;
-    const auto& map = options_.plan.ground.source_map;
-    if (map && map->memory_bytes() > 0) return map->memory_bytes();
-    const auto& world = options_.plan.ground.projection.system_map.map;
-    return world ? world->memory_bytes() : 0;
+    const bool is_read = system.epsg || !system.wkt.empty() || options_.plan.ground.projection.system_map.map;
+    return is_read ? Crs::kProjBytes : 0;
   }
 
   [[nodiscard]] std::uint64_t total(const MemoryPlan& memory) const {

@@ -62,4 +62,9 @@ std::string body_of(std::string_view name, std::optional<double> semi_major_axis
   return {};
 }
 
+Ellipsoid ellipsoid_of(const ReferenceSystem& system) {
+  if (!system.semi_major_axis_m) return {};
+  return {*system.semi_major_axis_m, system.inverse_flattening.value_or(0.0)};
+}
+
 }  // namespace isohf

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "isohf/error.h"
+#include "isohf/projection/body.h"
 #include "isohf/projection/reference_map.h"
 
 namespace isohf {
@@ -14,11 +15,6 @@ namespace {
 
 [[noreturn]] void refuse_source(const std::string& why) {
   throw Error(ErrorCode::kInvalidArgument, why);
-}
-
-Ellipsoid ellipsoid_of(const ReferenceSystem& system) {
-  if (!system.semi_major_axis_m) return {};
-  return {*system.semi_major_axis_m, system.inverse_flattening.value_or(0.0)};
 }
 
 /// The ground that samples stand for: pixel areas, or posts. Areas end at the poles.

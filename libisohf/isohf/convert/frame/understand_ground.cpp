@@ -4,6 +4,7 @@
 
 #include "isohf/convert.h"
 #include "isohf/error.h"
+#include "isohf/projection/body.h"
 #include "isohf/projection/crs/crs.h"
 #include "isohf/projection/crs/crs_operation.h"
 #include "isohf/projection/reference_map.h"
@@ -35,7 +36,7 @@ void understand_projection(const SourceInfo& info, const ReferenceMap* source_ma
     spec.kind = ProjectionKind::kSystem;
     const ReferenceSystem& own = info.georeference.system;
     if (own.semi_major_axis_m) {
-      spec.ellipsoid = {*own.semi_major_axis_m, own.inverse_flattening.value_or(0.0)};
+      spec.ellipsoid = ellipsoid_of(own);
     } else if (source_map != nullptr) {
       spec.ellipsoid = source_map->ellipsoid();
     }
@@ -49,12 +50,7 @@ void understand_projection(const SourceInfo& info, const ReferenceMap* source_ma
                               spec.system.name));
     }
     spec.map = understand_way(spec.system, spec.ellipsoid);
-    if (way.is_ballpark) {
-      request.system_note = fmt::format(
-          "{}: PROJ knows no way from its datum to that of \"{}\": they are taken for one, which may be off by some "
-          "hundred metres",
-          info.path, spec.system.name);
-    }
+    if (way.is_ballpark) request.system_note = info.path + ": " + ballpark_note("its datum", way);
   } catch (const Error& error) {
     throw Error(error.code(), fmt::format("{}: `projection`: {}", info.path, error.what()));
   }

@@ -66,7 +66,6 @@ class Crs final : public ReferenceMap {
   [[nodiscard]] MapPoint map_from_geo(GeoPoint place) const override;
   [[nodiscard]] double metres_per_unit() const override { return metres_per_unit_; }
   [[nodiscard]] const Ellipsoid& ellipsoid() const override { return description_.ellipsoid; }
-  [[nodiscard]] std::uint64_t memory_bytes() const override { return kProjBytes; }
 
   /// What PROJ holds of its database for one more system; the first is part of the program.
   static constexpr std::uint64_t kProjBytes = 5'000'000;

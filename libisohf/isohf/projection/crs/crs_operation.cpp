@@ -80,7 +80,6 @@ class PipelineMap final : public ReferenceMap {
   }
   [[nodiscard]] double metres_per_unit() const override { return 1.0; }
   [[nodiscard]] const Ellipsoid& ellipsoid() const override { return ellipsoid_; }
-  [[nodiscard]] std::uint64_t memory_bytes() const override { return Crs::kProjBytes; }
 
  private:
   ProjOperation operation_;
@@ -281,6 +280,12 @@ WayToSystem find_way(const ReferenceSystem& from, const std::string& to, const G
   way.map = understand_way(in_units, ellipsoid);
   way.is_ballpark = operation.is_ballpark;
   return way;
+}
+
+std::string ballpark_note(const std::string& from, const WayToSystem& way) {
+  return fmt::format(
+      "PROJ knows no way from {} to that of \"{}\": they are taken for one, which may be off by some hundred metres",
+      from, way.system.name);
 }
 
 std::shared_ptr<const ReferenceMap> understand_way(const MappedSystem& system, const Ellipsoid& ellipsoid) {

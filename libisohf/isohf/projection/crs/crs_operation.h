@@ -28,6 +28,9 @@ struct WayToSystem {
   bool is_ballpark = false;                 ///< PROJ knows no relation of the datums: they are taken for one
 };
 
+/// What to warn of where a way is_ballpark. `from`: "its datum", "the datum of A".
+[[nodiscard]] std::string ballpark_note(const std::string& from, const WayToSystem& way);
+
 /// Of PROJ's operations over a ground the first that transforms most of it; ballpark ones only as a last resort, those
 /// with missing grids never. `from` is a system whose datum alone matters; where it says nothing, WGS 84. Throws
 /// Error{kUnsupported}, in one line, where there is no operation; else as Crs::parse.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "isohf/error.h"
+#include "isohf/projection/body.h"
 #include "isohf/projection/crs/crs.h"
 #include "isohf/projection/crs/crs_operation.h"
 #include "isohf/projection/crs/source_system.h"
@@ -64,20 +65,13 @@ std::shared_ptr<const GridSystem> understand_grid_system(ArchiveReader& archive,
   }
   if (!(ground.west <= ground.east)) ground = {-180.0, -90.0, 180.0, 90.0};
   const Georeference own = source_georeference(metadata.source);
-  Ellipsoid ellipsoid;
-  if (own.system.semi_major_axis_m)
-    ellipsoid = {*own.system.semi_major_axis_m, own.system.inverse_flattening.value_or(0.0)};
+  const Ellipsoid ellipsoid = ellipsoid_of(own.system);
   try {
     const SystemOnBody on = on_body_of(own.system, ellipsoid, text);
     const WayToSystem way = find_way(own.system, on.text, ground, ellipsoid);
     SourceInfo there;
     take_system(on.text, there);
-    if (way.is_ballpark) {
-      warnings.push_back(loss(fmt::format(
-          "{}: PROJ knows no way from its datum to that of \"{}\": they are taken for one, which may be off by some "
-          "hundred metres",
-          archive.path(), way.system.name)));
-    }
+    if (way.is_ballpark) warnings.push_back(loss(archive.path() + ": " + ballpark_note("its datum", way)));
     auto system = std::make_shared<GridSystem>(GridSystem{way.map, there.georeference});
     const auto natural = grid_georeference(metadata, natural_grid(metadata));
     for (const Georeference& known : {natural.value_or(own), own}) {
