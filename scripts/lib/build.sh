@@ -15,22 +15,28 @@ isohf_jobs() {
   echo $((cores < memory_gb ? cores : memory_gb))
 }
 
+# isohf_folder PRESET: where it is built.
+isohf_folder() { if [[ $1 == release ]]; then echo "$root/build"; else echo "$root/build-$1"; fi; }
+
+# isohf_configure PRESET [-DNAME=VALUE...]: prints CMake's output only when something fails.
+isohf_configure() {
+  local preset=$1 folder log launcher=()
+  shift
+  folder=$(isohf_folder "$preset")
+  mkdir -p "$folder"
+  log=$folder/last_build.log
+  [[ -f $folder/build.ninja ]] || ! command -v ccache >/dev/null ||
+    launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON)
+  (cd "$root" && cmake --preset "$preset" "${launcher[@]}" "$@") >"$log" 2>&1 || { cat "$log" >&2; return 1; }
+}
+
 # isohf_build PRESET [TARGET...]: configures once and builds; prints ninja's output only when something fails.
 isohf_build() {
   local preset=$1 folder log
   shift
-  case $preset in
-    release) folder=$root/build ;;
-    *) folder=$root/build-$preset ;;
-  esac
-  mkdir -p "$folder"
+  folder=$(isohf_folder "$preset")
   log=$folder/last_build.log
-  if [[ ! -f $folder/build.ninja ]]; then
-    local launcher=()
-    command -v ccache >/dev/null &&
-      launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON)
-    (cd "$root" && cmake --preset "$preset" "${launcher[@]}") >"$log" 2>&1 || { cat "$log" >&2; return 1; }
-  fi
+  [[ -f $folder/build.ninja ]] || isohf_configure "$preset" || return 1
   [[ -f $folder/.ninja_log ]] || echo "isohf: building ${folder#"$root"/}; the first time takes some minutes" >&2
   local started=$SECONDS
   ninja -C "$folder" -j "$(isohf_jobs)" "$@" >"$log" 2>&1 || { cat "$log" >&2; return 1; }
