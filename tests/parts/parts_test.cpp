@@ -238,6 +238,22 @@ TEST_F(Parts, DiffSaysHowFarElevationsLieApart) {
   EXPECT_LE(apart.surface->max, 0.5 * (ArchiveReader(old).metadata().quantisation.scale + 0.01) + 1e-4);
 }
 
+TEST_F(Parts, DiffFindsAnotherOffsetUnderEqualCodes) {
+  options.texture.reset();
+  options.step = 0.01;
+  const std::string low = make("low.isohf");
+  options.z_range = {{370.0, 430.0}};
+  Hills source;
+  source.mutable_info().z_offset = 100.0;
+  (void)convert(source, folder / "high.isohf", options);
+  ASSERT_EQ(ArchiveReader(low).tile_digest({0, 0}), ArchiveReader(folder / "high.isohf").tile_digest({0, 0}));
+  const ArchiveDifference difference = diff_archives(low, folder / "high.isohf", true);
+  EXPECT_EQ(difference.tiles_differing, ArchiveReader(low).metadata().tiles_stored);
+  EXPECT_NEAR(difference.surface->mean, 100.0, 1e-9);
+  EXPECT_NEAR(difference.surface->max, 100.0, 1e-9);
+  EXPECT_EQ(difference.surface->voids, 0);
+}
+
 /// Shards, made in an odd order.
 class Shards : public Parts {
  protected:

@@ -75,8 +75,9 @@ struct ArchiveDifference {
   [[nodiscard]] bool same_tiles() const { return why_other_lattice.empty() && tiles_differing == 0; }
 };
 
-/// Compares metadata, and tiles by their stored digests: none is decoded but those that have no digest (repacked archives), and
-/// with `surface` those that differ. Stage "compare". Memory is bounded.
+/// Compares metadata, and tiles by their stored digests. Decodes tiles without a digest (repacked archives), with `surface`
+/// those that differ, and all of them if the archives code elevations by another type, offset or scale. Stage "compare".
+/// Memory is bounded.
 [[nodiscard]] ArchiveDifference diff_archives(const std::string& first, const std::string& second, bool surface = false,
                                               const Job& job = {});
 
