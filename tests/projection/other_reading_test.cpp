@@ -50,6 +50,19 @@ TEST(OtherReading, IsNoneWherePlacesLieElsewhere) {
   }
 }
 
+TEST(OtherReading, OfABoxThatLiesInsideAsItIsIsNotTheSwappedOne) {
+  // Degrees on a map of a whole body, on which 10 by 20 metres lie as well.
+  const MapBounds globe{-5458000.0, -2729000.0, 5458000.0, 2729000.0};
+  constexpr double kMetres = 30000.0;
+  const std::vector<PairReading> readings = {own_reading(globe, false), geographic_reading([](GeoPoint place) {
+                                               return MapPoint{kMetres * place.longitude, kMetres * place.latitude};
+                                             })};
+  const auto box = other_reading({10.0, 20.0, 40.0, 40.0}, globe, readings);
+  ASSERT_TRUE(box);
+  EXPECT_EQ(box->words, "longitude, latitude");
+  EXPECT_EQ(box->bounds.east, 40.0 * kMetres);
+}
+
 TEST(OtherReading, GivesTheBoxToType) {
   const auto box = other_reading({34.25, -118.2, 34.45, -118.0}, kDegrees, of_degrees());
   ASSERT_TRUE(box);

@@ -74,7 +74,9 @@ void add_geographic_readings(std::vector<PairReading>& readings, const std::stri
 
 std::optional<OtherReading> other_reading(const MapBounds& asked, const MapBounds& covered,
                                           std::span<const PairReading> readings) {
-  for (std::size_t i = 0; i < readings.size(); ++i) {
+  // What lies inside as it is has not been swapped.
+  const std::size_t first = !readings.empty() && bounds_inside(asked, covered, readings[0], false) ? 1 : 0;
+  for (std::size_t i = first; i < readings.size(); ++i) {
     for (const bool is_swapped : {false, true}) {
       if (i == 0 && !is_swapped) continue;
       if (const auto bounds = bounds_inside(asked, covered, readings[i], is_swapped)) {

@@ -38,8 +38,9 @@ struct OtherReading {
   MapBounds bounds;  ///< in the shared coordinates
 };
 
-/// What numbers (a box, or a place: a box without a size) may have been meant as that lie outside of `covered` as
-/// readings[0] has them: the first reading, as it is or swapped, by which they lie inside.
+/// What numbers (a box, or a place: a box without a size) may have been meant as that name nothing of use in `covered` as
+/// readings[0] has them: the first reading, as it is or swapped, by which they lie inside. If they lie inside as
+/// readings[0] has them, too small to be of use, only the other readings count.
 [[nodiscard]] std::optional<OtherReading> other_reading(const MapBounds& asked, const MapBounds& covered,
                                                         std::span<const PairReading> readings);
 
