@@ -1,7 +1,9 @@
 #include "isohf/convert/job_description.h"
 #include "isohf/archive/tile/tile_codes.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <functional>
 #include <set>
@@ -64,6 +66,14 @@ TEST(JobFingerprint, TellsEffortsSeedsTexturesAndTapsApart) {
   std::set<std::string> found;
   for (const ConvertOptions& options : all) {
     EXPECT_TRUE(found.insert(job_fingerprint(info, make_plan(info, options.plan), options)).second) << found.size();
+  }
+}
+
+TEST(JobFingerprint, NamesTheLibrariesThatDecideBytes) {
+  const std::string found = fingerprint(source_info());
+  EXPECT_THAT(found, testing::HasSubstr(std::string("zlib ") + zlibVersion()));
+  for (const char* library : {"libdeflate 1", "libpng 1", "PROJ Rel. ", "GeographicLib "}) {
+    EXPECT_THAT(found, testing::HasSubstr(library));
   }
 }
 

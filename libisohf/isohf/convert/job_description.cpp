@@ -3,8 +3,13 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <libdeflate.h>
+#include <png.h>
+#include <proj.h>
 #include <sys/stat.h>
+#include <zlib.h>
 
+#include <GeographicLib/Constants.hpp>
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -204,10 +209,17 @@ std::string difference_from_job(const std::string& archive, const SourceInfo& in
          (found.empty() ? "other elevation codes, shadow seeds, textures or residuals" : found);
 }
 
+/// Other versions of these may make other bytes. libdeflate and GeographicLib state those they were compiled against.
+std::string library_versions() {
+  return fmt::format("zlib {}, libdeflate {}, libpng {}, PROJ {}, GeographicLib {}", zlibVersion(),
+                     LIBDEFLATE_VERSION_STRING, png_get_libpng_ver(nullptr), proj_info().release,
+                     GEOGRAPHICLIB_VERSION_STRING);
+}
+
 }  // namespace
 
 std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options) {
-  return fingerprint(info, plan, options, true);
+  return fingerprint(info, plan, options, true) + " | " + library_versions();
 }
 
 Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOptions& options,

@@ -10,8 +10,8 @@
 
 namespace isohf {
 
-/// Everything that decides the bytes of an archive, as text: two runs with the same fingerprint may continue each
-/// other.
+/// Everything that decides the bytes of an archive, versions of libraries included, as text: two runs with the same
+/// fingerprint may continue each other.
 [[nodiscard]] std::string job_fingerprint(const SourceInfo& info, const Plan& plan, const ConvertOptions& options);
 
 /// The metadata that is known before a tile is cut: all but statistics, counts and hash.
