@@ -63,9 +63,12 @@ int run(ShadeCommand options) {
   const Metadata& metadata = archive.metadata();
   if (const auto& ground = metadata.source.ground;
       ground && !metadata.projection && ground->worst_error > MapGround::kTrueEnough) {
-    print_warning(common, fmt::format("{}: lengths on its map are {:.4g} times those on the ground, and slopes and "
-                                      "shadows are the map's. For true ones convert with --to-crs auto",
-                                      options.archive, ground->mean_scale));
+    constexpr double kMostOnOneMap_deg = 180.0;
+    const bool is_wide = ground->extent.east - ground->extent.west > kMostOnOneMap_deg;
+    print_warning(common,
+                  fmt::format("{}: lengths on its map are {:.4g} times those on the ground, and slopes and "
+                              "shadows are the map's. For true ones convert {} --to-crs auto",
+                              options.archive, ground->mean_scale, is_wide ? "a part, with --bbox and" : "with"));
   }
   ShadeOptions& request = options.picture;
   const GridSize size = request.size.value_or(shade_size(archive, options.longest));

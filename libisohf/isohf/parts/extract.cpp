@@ -250,7 +250,7 @@ PartSummary extract_tiles(const std::string& archive, const std::string& output,
   PartSummary summary;
   if (plane == 0 && lossless_record(reader.metadata())) {
     summary.warnings.push_back(
-        loss(archive + ": residuals are left out; the samples of the source come back to within the step alone"));
+        loss(archive + ": residuals are left out; the extract does not return the samples of the source bit for bit"));
   }
   if (options.strict && !summary.warnings.empty()) throw error_from(summary.warnings);
   ArchiveWriter writer(output, metadata.grid, options_while_copying(metadata, options));
