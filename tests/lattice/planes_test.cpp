@@ -319,6 +319,7 @@ TEST(Planes, TilesOfThreePlanesMeetWithoutTJunctions) {
 
 TEST(Planes, SideListsArePartsOfTheStitchListsWoundTheOtherWay) {
   for (const TileShape& shape : deepest_shapes(24, 35)) {
+    if (shape.levels() == 1) continue;  // no stride of theirs is a plane's
     std::set<Triangle> stitches;
     for (const Triangle& t : triangles_of_list(stitch_indices(shape))) stitches.insert(t);
     std::size_t sides = 0;

@@ -4,25 +4,10 @@
 
 #include "isohf/base/assert.h"
 #include "isohf/error.h"
-#include "isohf/lattice/planes.h"
-#include "isohf/lattice/stitch.h"
-#include "isohf/lattice/strip.h"
+#include "isohf/mesh.h"
 
 namespace isohf::view {
 namespace {
-
-std::vector<std::int16_t> object_places(const TileShape& shape) {
-  std::vector<std::int16_t> places;
-  places.reserve(static_cast<std::size_t>(2 * shape.stored_vertex_count()));
-  for (int row = 0; row < shape.rows(); ++row) {
-    for (int column = 0; column < shape.columns(); ++column) {
-      const ObjectVertex place = object_from_grid(shape, GridVertex{column, row});
-      places.push_back(static_cast<std::int16_t>(place.x));
-      places.push_back(static_cast<std::int16_t>(place.z));
-    }
-  }
-  return places;
-}
 
 template <typename T>
 void upload_static(GLenum target, const std::vector<T>& values) {
@@ -39,15 +24,17 @@ const void* offset_pointer(std::size_t bytes) {
 }  // namespace
 
 IndexArrays make_index_arrays(const TileShape& shape, int plane_stride) {
+  const TileMesh mesh(shape, plane_stride);
+  const auto copy = [](std::span<const std::uint32_t> part) { return std::vector(part.begin(), part.end()); };
   IndexArrays arrays;
   for (int level = 0; level < shape.levels(); ++level) {
-    arrays.strips.push_back(strip_indices(shape, level));
-    arrays.stitch_counts.push_back(static_cast<std::size_t>(shape.stitch_index_count(level)));
+    arrays.strips.push_back(copy(mesh.strip(level)));
+    arrays.stitch_counts.push_back(mesh.stitch(level).size());
   }
-  arrays.stitch = stitch_indices(shape);
+  arrays.stitch = copy(mesh.stitch(shape.levels() - 1));
   if (plane_stride == 0) return arrays;
   for (const TileSide side : {TileSide::kWest, TileSide::kEast, TileSide::kNorth, TileSide::kSouth}) {
-    arrays.sides.push_back(side_stitch_indices(shape, side, plane_stride));
+    arrays.sides.push_back(copy(mesh.side_stitch(side)));
   }
   return arrays;
 }
@@ -71,7 +58,7 @@ SharedGeometry::SharedGeometry(const TileShape& shape, const IndexArrays& arrays
 
   glBindVertexArray(0);
   glBindBuffer(GL_ARRAY_BUFFER, xz_.get());
-  upload_static(GL_ARRAY_BUFFER, object_places(shape));
+  upload_static(GL_ARRAY_BUFFER, object_positions(shape));
   // The element array belongs to a vertex array's state: fill the buffer through another target.
   glBindBuffer(GL_COPY_WRITE_BUFFER, indices_.get());
   upload_static(GL_COPY_WRITE_BUFFER, all);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "isohf/lattice/planes.h"
+#include "isohf/mesh.h"
 #include "paging/tile_source.h"
 
 namespace isohf::view {

@@ -9,6 +9,7 @@
 #include "isohf/error.h"
 #include "isohf/job.h"
 #include "isohf/lattice.h"
+#include "isohf/mesh.h"
 #include "isohf/metadata.h"
 #include "isohf/parts.h"
 #include "isohf/picture.h"

@@ -10,10 +10,6 @@ namespace {
 
 constexpr int kStrides[] = {8, 4};
 
-bool allows(const TileShape& shape, int stride) {
-  return shape.cell_columns() % stride == 0 && shape.cell_rows() / 2 % stride == 0;
-}
-
 std::int64_t tiles_above(std::int64_t tiles, int stride) {
   return (tiles + stride - 1) / stride;
 }
@@ -24,9 +20,14 @@ TileShape with_levels(const TileShape& shape, int levels) {
 
 }  // namespace
 
+bool allows_planes(const TileShape& shape, int stride) {
+  return stride >= 2 && std::has_single_bit(static_cast<unsigned>(stride)) && shape.cell_columns() % stride == 0 &&
+         shape.cell_rows() / 2 % stride == 0;
+}
+
 int plane_stride(const TileShape& shape) {
   for (const int stride : kStrides) {
-    if (allows(shape, stride)) return stride;
+    if (allows_planes(shape, stride)) return stride;
   }
   return 0;
 }
@@ -39,45 +40,11 @@ int plane_count(const TileGrid& grid, int stride) {
   return count;
 }
 
-std::vector<std::uint32_t> side_stitch_indices(const TileShape& shape, TileSide side, int stride) {
-  ISOHF_ASSERT(std::has_single_bit(static_cast<unsigned>(stride)) && allows(shape, stride));
-  const int south = shape.rows() - 2;
-  const auto east = [&](int row) { return shape.columns() - (row % 2 == 0 ? 2 : 3); };
-  const bool along_z = side == TileSide::kWest || side == TileSide::kEast;
-  const int end = along_z ? south : shape.columns() - 3;
-  const auto vertex = [&](int along) -> GridVertex {
-    switch (side) {
-      case TileSide::kWest:
-        return {1, along};
-      case TileSide::kEast:
-        return {east(along), along};
-      case TileSide::kNorth:
-        return {along, 1};
-      case TileSide::kSouth:
-        break;
-    }
-    return {along, south};
-  };
-  // The border runs down the West edge and on counter-clockwise seen from above.
-  const bool forwards = side == TileSide::kWest || side == TileSide::kSouth;
-  std::vector<std::uint32_t> list;
-  for (int step = 2; step <= stride; step *= 2) {
-    for (int along = 1; along < end; along += step) {
-      const int kept[] = {along, along + step};
-      for (const int at : {kept[forwards ? 0 : 1], kept[forwards ? 1 : 0], along + step / 2}) {
-        const GridVertex at_vertex = vertex(at);
-        list.push_back(static_cast<std::uint32_t>(at_vertex.column + at_vertex.row * shape.columns()));
-      }
-    }
-  }
-  return list;
-}
-
 Planes::Planes(const TileGrid& grid, int stride, int count, bool wraps_x)
     : stride_(stride), wraps_x_(wraps_x), mesh_shape_(grid.shape()) {
   grids_.push_back(grid);
   if (count == 0) return;
-  ISOHF_ASSERT(stride >= 2 && std::has_single_bit(static_cast<unsigned>(stride)) && allows(grid.shape(), stride));
+  ISOHF_ASSERT(allows_planes(grid.shape(), stride));
   step_ = std::countr_zero(static_cast<unsigned>(stride));
   mesh_shape_ = with_levels(grid.shape(), step_ + 1);
   for (int plane = 1; plane <= count; ++plane) {

@@ -21,18 +21,12 @@
 
 namespace isohf {
 
-/// The four sides of a tile.
-enum class TileSide { kWest, kEast, kNorth, kSouth };
-
 /// S for tiles of a shape: 8, or else 4, where C-4 and (R-3)/2 are multiples of it; 0 where there are no planes.
 [[nodiscard]] int plane_stride(const TileShape& shape);
+/// If tiles of a shape may have planes of this stride: a power of two >= 2 that divides C-4 and (R-3)/2.
+[[nodiscard]] bool allows_planes(const TileShape& shape, int stride);
 /// Planes above the tiles until one tile is left; stride a power of two >= 2.
 [[nodiscard]] int plane_count(const TileGrid& grid, int stride);
-
-/// Indices c + r*C of the triangles that a tile draws on one side beside a tile of the next coarser plane, with
-/// whatever level's strip and whole stitch list: the stitch triangles of strides 2 to `stride` of that side, wound the
-/// other way, so that they leave the coarser tile's border. Finest first. C-4 and (R-3)/2 are multiples of `stride`.
-[[nodiscard]] std::vector<std::uint32_t> side_stitch_indices(const TileShape& shape, TileSide side, int stride);
 
 /// All planes of a heightfield. Immutable.
 class Planes {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "isohf/lattice.h"
+#include "isohf/mesh.h"
 
 /// The triangle list that joins a coarse strip to the full-detail border (paper section 3.5, Eqs. 5-6, appendix), so
 /// that tiles of any two levels meet without T-junctions.
@@ -24,5 +25,11 @@ namespace isohf {
 /// the list of the next: level λ draws the first shape.stitch_index_count(λ) indices (none at level 0).
 /// Returns shape.stitch_index_count(shape.levels() - 1) indices. O(result); throws only std::bad_alloc.
 [[nodiscard]] std::vector<std::uint32_t> stitch_indices(const TileShape& shape);
+
+/// The triangles that a tile draws on one side beside a tile of the next coarser plane, with whatever level's strip and
+/// its whole stitch list: the stitch triangles of strides 2 to `stride` of that side, wound the other way, so that they
+/// leave the coarser tile's border. Indices c + r*C, finest first.
+/// stride  allows_planes(shape, stride)
+[[nodiscard]] std::vector<std::uint32_t> side_stitch_indices(const TileShape& shape, TileSide side, int stride);
 
 }  // namespace isohf
