@@ -1,11 +1,15 @@
-/// isohf export: an archive as a raster of elevations, on its source's grid or any other, whole or cut into tiles.
+/// isohf export: an archive as a raster of elevations, on its source's grid or any other, whole or cut into tiles, or as
+/// a mesh.
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <optional>
+#include <span>
 
 #include "commands/command.h"
+#include "commands/export_mesh.h"
+#include "formats/mesh/mesh_sink.h"
 #include "formats/write/archive_raster.h"
 #include "formats/write/raster_tiles.h"
 #include "input/box_ground.h"
@@ -36,6 +40,8 @@ With another grid, --method, --raw-scale or --raw-offset the samples are elevati
 over the range of elevations in .png, .r16 and .raw, with scale and offset in OUTPUT.json.
 With --tile-size the North-West tile is NAME_x0_y0.r16; x counts East, y South. All tiles share one scale. Without
 --size the size becomes the nearest one that makes whole tiles.
+A mesh (.glb, .obj, .ply) has the archive's own triangles, with normals and texture coordinates, without nodata. .glb and
+.obj: x East, y up, z South, an object for each tile; .glb has the textures too. .ply: x East, y North, z up.
 Methods: hex, quintic B-splines, is nearest to the source; barycentric is what a renderer draws; average is the mean
 over each sample's area. Default: average if samples are at least 1.5 times as far apart as the source's, barycentric
 if rows are not rows of the archive's map, else hex.
@@ -47,7 +53,13 @@ Examples:
   isohf export dem.isohf map.tif --to-crs none
   isohf export dem.isohf alps.png --size 4097x4097
   isohf export dem.isohf part.tif --bbox 6.5,45,7,45.5
-  isohf export dem.isohf unreal.r16 --tile-size 1009 --overlap 1)";
+  isohf export dem.isohf unreal.r16 --tile-size 1009 --overlap 1
+  isohf export dem.isohf dem.glb --max-triangles 500000)";
+
+constexpr const char* kRasterOptions[] = {"--like",      "--size",       "--spacing",     "--to-crs",
+                                          "--method",    "--tile-size",  "--overlap",     "--type",
+                                          "--raw-scale", "--raw-offset", "--clamp-range", "--surface"};
+constexpr const char* kMeshOptions[] = {"--tiles", "--level", "--max-triangles", "--max-error", "--exaggeration"};
 
 /// In --to-crs: the map that an archive lies on, as it is stored.
 constexpr const char* kOwnMap = "none";
@@ -69,6 +81,7 @@ struct ExportOptions {
   std::optional<SampleType> type{};
   RasterRequest samples{};  ///< scale, offset, clamps, method
   bool surface = false;
+  ExportMeshOptions mesh{};
 
   /// All of it, or a part.
   [[nodiscard]] bool is_on_sources_grid() const {
@@ -311,7 +324,9 @@ Run add_export(CLI::App& line, Common& common) {
   ExportOptions& options = *kept;
   positional(line, "ARCHIVE", "Archive to read", options.archive);
   positional(line, "OUTPUT,-o,--output",
-             "Raster to write: .tif, .exr, .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy", options.output);
+             "Raster to write: .tif, .exr, .png, .hgt, .asc, .flt, .r16, .raw, .r32 or .npy; or mesh: .glb, .obj or "
+             ".ply",
+             options.output);
   line.add_flag("--overwrite", options.overwrite, "Replace OUTPUT if it exists, and remove its tiles of another cut");
   group(line, "Grid");
   option(line, "--like", "INPUT", "Use the grid of this raster, or of a folder, \"pattern*\" or @list of them",
@@ -359,14 +374,46 @@ Run add_export(CLI::App& line, Common& common) {
   line.add_flag("--clamp-range", options.samples.clamps,
                 "Clamp samples that the type does not hold, instead of failing");
   line.add_flag("--surface", options.surface, "Write the surface, even if --lossless kept the source's samples");
+  group(line, "Meshes");
+  CLI::Option* const mesh_tiles =
+      option(line, "--tiles", "A:B,C:D", "Take columns A to B-1 and rows C to D-1 of tiles, from 0 in the North-West",
+             [&options](const std::string& text) { options.mesh.mesh.tiles = parse_tile_range(text); });
+  option(line, "--level", "N",
+         "Take this level of detail, 0 is full; beyond the tiles' levels, of overviews [default: 0]",
+         [&options](const std::string& text) {
+           options.mesh.mesh.level = static_cast<int>(parse_whole_number(text, 0, 255));
+         });
+  option(line, "--max-triangles", "N", "Take the finest level that has at most N triangles",
+         [&options](const std::string& text) {
+           options.mesh.mesh.max_triangles = parse_whole_number(text, 1, std::int64_t{1} << 40U);
+         });
+  option(line, "--max-error", "E", "Take for each tile its coarsest level within E of level 0, in elevation units",
+         [&options](const std::string& text) { options.mesh.mesh.max_error = parse_positive_number(text); });
+  option(line, "--exaggeration", "F", "Make heights F times as high [default: 1]",
+         [&options](const std::string& text) { options.mesh.exaggeration = parse_positive_number(text); });
+  exclusive(line, {"--level", "--max-triangles", "--max-error"});
+  mesh_tiles->excludes(line.get_option("--bbox"));
   for (const char* rival : {"--size", "--spacing", "--to-crs", "--bbox", "--tile-size"})
     exclusive(line, {"--like", rival});
   add_work_options(line, options.work, common);
   add_memory_option(line, options.work);
-  most_used(line, {"--overwrite", "--like", "--size", "--spacing", "--to-crs", "--bbox", "--tile-size", "--overlap",
-                   "--type", "--raw-scale"});
+  most_used(line, {"--overwrite", "--like", "--size", "--spacing", "--to-crs", "--bbox", "--tile-size",
+                   "--max-triangles", "--type", "--raw-scale"});
   line.footer(kExportFooter);
-  return [kept] {
+  return [kept, &line] {
+    const bool is_mesh = is_mesh_name(kept->output);
+    for (const char* const option : is_mesh ? std::span<const char* const>(kRasterOptions) : kMeshOptions) {
+      if (!given(line, option)) continue;
+      throw Error(ErrorCode::kInvalidArgument,
+                  fmt::format("{} is for {}, and {} is not one", option, is_mesh ? "rasters" : "meshes", kept->output));
+    }
+    if (is_mesh) {
+      kept->mesh.archive = kept->archive;
+      kept->mesh.output = kept->output;
+      kept->mesh.overwrite = kept->overwrite;
+      kept->mesh.bbox = kept->bbox;
+      return export_mesh(kept->mesh, kept->common, kept->work);
+    }
     if (is_archive_name(kept->output) && kept->archive != kept->output) {
       throw Error(ErrorCode::kInvalidArgument,
                   kept->output + ": OUTPUT has an archive's name; ARCHIVE comes first, OUTPUT last");

@@ -14,5 +14,7 @@ namespace isohf::cli {
 void check_archive_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite);
 /// A raster replaces rasters of its format; so do the files beside it.
 void check_raster_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite);
+/// A mesh replaces meshes of its format and empty files.
+void check_mesh_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite);
 
 }  // namespace isohf::cli

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "isohf/mesh.h"
+#include "isohf/projection.h"
+
+namespace isohf {
+
+/// What a mesh file states beside its triangles.
+struct MeshSpec {
+  std::string name;                    ///< of the archive, without folder
+  std::string producer;                ///< "isohf 0.1.0"
+  std::string unit;                    ///< of positions: "metre", or "unknown"
+  std::string crs;                     ///< of `origin`: "EPSG:32632", a name; empty if it is not known
+  std::optional<MapPoint> origin;      ///< of position (0, 0, 0) in that system
+  std::optional<GeoPoint> origin_geo;  ///< the same in degrees
+  double elevation_scale = 1.0;        ///< positions' y for one vertical unit
+  std::int64_t pieces = 0;             ///< at most
+  bool overwrite = false;
+};
+
+/// A mesh file, written piece by piece. Everything goes to NAME.part until finish(); a sink that is destroyed before
+/// leaves nothing behind. One thread calls. Memory: some kilobytes for each piece.
+class MeshSink {
+ public:
+  MeshSink() = default;
+  MeshSink(const MeshSink&) = delete;
+  MeshSink& operator=(const MeshSink&) = delete;
+  virtual ~MeshSink() = default;
+
+  /// picture  the piece's texture as a PNG or JPEG file; empty: none
+  /// Throws Error naming the path: kIo, kInvalidArgument (more than the format holds).
+  virtual void write(const MeshPiece& piece, std::span<const std::byte> picture) = 0;
+  /// Completes the file and gives it its name. Throws Error{kIo}.
+  virtual void finish() = 0;
+
+  [[nodiscard]] std::int64_t vertices() const { return vertices_; }
+  [[nodiscard]] std::int64_t triangles() const { return triangles_; }
+
+ protected:
+  void count(const MeshPiece& piece) {
+    vertices_ += static_cast<std::int64_t>(piece.vertices.size());
+    triangles_ += static_cast<std::int64_t>(piece.indices.size() / 3);
+  }
+
+ private:
+  std::int64_t vertices_ = 0;
+  std::int64_t triangles_ = 0;
+};
+
+/// If a name ends in .glb, .obj or .ply, in any case.
+[[nodiscard]] bool is_mesh_name(const std::string& path);
+
+/// If the format of that name also holds pictures: .glb.
+[[nodiscard]] bool is_textured_mesh_name(const std::string& path);
+
+/// Begins a mesh file whose format follows from the extension of `path`.
+///   .glb  glTF 2.0: x East, y up, z South; a mesh for each tile, with texture coordinates and pictures
+///   .obj  Wavefront: the same axes; an object for each tile, with texture coordinates, without pictures
+///   .ply  binary: x East, y North, z up; one mesh, edges between tiles repeated
+/// Throws Error naming the path: kInvalidArgument (no such extension; the file exists and overwrite is not set), kIo.
+[[nodiscard]] std::unique_ptr<MeshSink> create_mesh(const std::string& path, const MeshSpec& spec);
+
+}  // namespace isohf
