@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "formats/io/file_stamp.h"
-#include "formats/module_loader.h"
+#include "formats/io/module_loader.h"
 #include "formats/netcdf/netcdf_file.h"
 #include "isohf/base/text/text.h"
 #include "isohf/error.h"

@@ -6,7 +6,7 @@
 
 #include "formats/georeference/sidecars.h"
 #include "formats/io/foreign_file.h"
-#include "formats/module_loader.h"
+#include "formats/io/module_loader.h"
 #include "formats/oiio/oiio_plugin.h"
 #include "formats/open_options.h"
 #include "formats/photo/photo.h"

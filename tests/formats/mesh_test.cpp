@@ -1,4 +1,4 @@
-#include "formats/mesh/mesh_sink.h"
+#include "formats/mesh/create_mesh.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -47,6 +47,7 @@ std::vector<Captured> captured(const TileGrid& grid, TileIndex tile, const std::
   glTexImage2D(GL_TEXTURE_2D, 0, GL_R16UI, shape.columns(), shape.rows(), 0, GL_RED_INTEGER, GL_UNSIGNED_SHORT,
                codes.data());
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
   const WorldPoint corner = grid.world_from_object(tile, {0.0, 0.0});
   const std::array<float, 16> identity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   glUniform2i(program.uniform("shape"), shape.columns(), shape.rows());

@@ -9,7 +9,7 @@
 
 #include "commands/command.h"
 #include "commands/export_mesh.h"
-#include "formats/mesh/mesh_sink.h"
+#include "formats/mesh/create_mesh.h"
 #include "formats/write/archive_raster.h"
 #include "formats/write/raster_tiles.h"
 #include "input/box_ground.h"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "formats/mesh/mesh_sink.h"
+#include "formats/mesh/create_mesh.h"
 #include "isohf/archive/textures/texture_info.h"
 #include "isohf/base/arena.h"
 #include "isohf/error.h"

@@ -4,8 +4,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <libdeflate.h>
-#include <png.h>
-#include <proj.h>
 #include <sys/stat.h>
 #include <zlib.h>
 
@@ -22,6 +20,7 @@
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/error.h"
+#include "isohf/projection/crs/proj.h"
 
 namespace isohf {
 namespace {
@@ -211,9 +210,8 @@ std::string difference_from_job(const std::string& archive, const SourceInfo& in
 
 /// Other versions of these may make other bytes. libdeflate and GeographicLib state those they were compiled against.
 std::string library_versions() {
-  return fmt::format("zlib {}, libdeflate {}, libpng {}, PROJ {}, GeographicLib {}", zlibVersion(),
-                     LIBDEFLATE_VERSION_STRING, png_get_libpng_ver(nullptr), proj_info().release,
-                     GEOGRAPHICLIB_VERSION_STRING);
+  return fmt::format("zlib {}, libdeflate {}, PROJ {}, GeographicLib {}", zlibVersion(), LIBDEFLATE_VERSION_STRING,
+                     proj::release(), GEOGRAPHICLIB_VERSION_STRING);
 }
 
 }  // namespace

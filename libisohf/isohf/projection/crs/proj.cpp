@@ -31,4 +31,8 @@ std::string wkt_of(PJ_CONTEXT* context, const PJ* object, PJ_WKT_TYPE dialect) {
   return text != nullptr ? text : "";
 }
 
+std::string release() {
+  return proj_info().release;
+}
+
 }  // namespace isohf::proj

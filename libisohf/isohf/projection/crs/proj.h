@@ -30,6 +30,9 @@ using Object = std::unique_ptr<PJ, Destroy<proj_destroy>>;
 /// Text on one line, as PROJ writes it; empty where the dialect cannot say it.
 [[nodiscard]] std::string wkt_of(PJ_CONTEXT* context, const PJ* object, PJ_WKT_TYPE dialect);
 
+/// PROJ's, as "Rel. 9.1.1, December 1st, 2022".
+[[nodiscard]] std::string release();
+
 /// Degrees in a radian.
 inline constexpr double kDegreesPerRadian = 57.295779513082320877;
 

@@ -91,7 +91,7 @@ MeshPlan plan_mesh(const ArchiveReader& archive, const MeshRequest& request, con
   if (request.level.has_value() + request.max_triangles.has_value() + request.max_error.has_value() > 1) {
     refuse("`level`, `max_triangles` and `max_error` exclude each other");
   }
-  if (!std::isfinite(request.elevation_scale)) refuse("`elevation_scale` is not a number");
+  if (!std::isfinite(request.elevation_scale)) refuse("the scale of elevations is not a number");
   const Planes planes = planes_of(archive.metadata());
   MeshPlan plan;
   if (request.max_error) {

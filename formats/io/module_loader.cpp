@@ -1,4 +1,4 @@
-#include "formats/module_loader.h"
+#include "formats/io/module_loader.h"
 
 #include <dlfcn.h>
 #include <fmt/format.h>
