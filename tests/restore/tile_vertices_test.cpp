@@ -24,7 +24,7 @@ using ::testing::HasSubstr;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-double hills(LatticeVertex at) {
+double height_at(LatticeVertex at) {
   return 40.0 * std::sin(0.31 * static_cast<double>(at.x)) * std::cos(0.57 * static_cast<double>(at.z));
 }
 
@@ -34,7 +34,7 @@ std::vector<double> elevations_of(const TileGrid& grid, TileIndex tile, int scal
   for (int row = 0; row < grid.shape().rows(); ++row) {
     for (int column = 0; column < grid.shape().columns(); ++column) {
       const LatticeVertex at = grid.lattice_vertex(tile, {column, row});
-      elevations.push_back(hills({at.x * scale, at.z * scale}));
+      elevations.push_back(height_at({at.x * scale, at.z * scale}));
     }
   }
   return elevations;
