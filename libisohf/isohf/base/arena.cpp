@@ -9,10 +9,10 @@
 #include <chrono>
 #include <cstddef>
 #include <deque>
+#include <exception>
 #include <limits>
 #include <mutex>
 #include <semaphore>
-#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -44,8 +44,8 @@ int possible_threads(int wanted) {
   try {
     others.reserve(static_cast<std::size_t>(wanted));
     while (static_cast<int>(others.size()) + 1 < wanted) others.emplace_back([&] { end.acquire(); });
-  } catch (const std::system_error&) {
-    // Then fewer.
+  } catch (const std::exception&) {
+    // The system has no more threads, or no memory for one: then fewer. Those that run must be joined.
   }
   const int possible = static_cast<int>(others.size()) + 1;
   end.release(possible);
