@@ -3,10 +3,7 @@
 
 #include <algorithm>
 #include <array>
-#include <csetjmp>
-#include <cstdio>
-#include <cstring>
-#include <new>
+#include <memory>
 
 #include "isohf/archive/textures/picture_codec.h"
 #include "isohf/base/assert.h"
@@ -15,153 +12,76 @@
 namespace isohf {
 namespace {
 
-constexpr int kCompressionLevel = 6;
-
-/// What libpng's callbacks say before they jump.
-struct Failure {
-  std::array<char, 160> text{};
-
-  static void note(png_structp png, png_const_charp text) {
-    auto* const failure = static_cast<Failure*>(png_get_error_ptr(png));
-    std::snprintf(failure->text.data(), failure->text.size(), "%s", text);
-    png_longjmp(png, 1);
-  }
-  static void ignore(png_structp, png_const_charp) {}
-};
-
-int colour_type(int channels) {
-  if (channels == 1) return PNG_COLOR_TYPE_GRAY;
-  return channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_RGB_ALPHA;
+png_uint_32 format_of(int channels) {
+  if (channels == 1) return PNG_FORMAT_GRAY;
+  return channels == 3 ? PNG_FORMAT_RGB : PNG_FORMAT_RGBA;
 }
 
-/// A growing buffer; running out of memory must not throw through libpng.
-struct Sink {
-  std::vector<std::byte> bytes;
-  bool full = false;
-
-  static void write(png_structp png, png_bytep data, std::size_t size) {
-    auto* const sink = static_cast<Sink*>(png_get_io_ptr(png));
-    try {
-      const auto* const from = reinterpret_cast<const std::byte*>(data);
-      sink->bytes.insert(sink->bytes.end(), from, from + size);
-    } catch (const std::bad_alloc&) {
-      sink->full = true;
-    }
-    if (sink->full) png_error(png, "out of memory");
-  }
-  static void flush(png_structp) {}
-};
-
-struct Input {
-  std::span<const std::byte> left;
-
-  static void read(png_structp png, png_bytep data, std::size_t size) {
-    auto* const input = static_cast<Input*>(png_get_io_ptr(png));
-    if (size > input->left.size()) png_error(png, "ends early");
-    std::memcpy(data, input->left.data(), size);
-    input->left = input->left.subspan(size);
-  }
-};
-
-/// Holds nothing that a jump could leak.
-bool write_all(png_structp png, png_infop info, const Picture& picture, Sink& sink) {
-  if (setjmp(png_jmpbuf(png)) != 0) return false;  // NOLINT(cert-err52-cpp): libpng's way to return errors
-  png_set_write_fn(png, &sink, Sink::write, Sink::flush);
-  png_set_IHDR(png, info, static_cast<png_uint_32>(picture.width), static_cast<png_uint_32>(picture.height), 8,
-               colour_type(picture.channels), PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
-               PNG_FILTER_TYPE_DEFAULT);
-  png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
-  png_set_compression_level(png, kCompressionLevel);
-  png_write_info(png, info);
-  for (int row = 0; row < picture.height; ++row) png_write_row(png, picture.row(row));
-  png_write_end(png, nullptr);
-  return true;
-}
-
+/// The header, which stands at the same bytes of every file.
 struct Header {
-  png_uint_32 width = 0;
-  png_uint_32 height = 0;
-  int depth = 0;
-  int type = 0;
-  int interlace = 0;
-};
+  int depth;
+  int type;
+  int interlace;
 
-bool read_header(png_structp png, png_infop info, Input& input, Header& header) {
-  if (setjmp(png_jmpbuf(png)) != 0) return false;  // NOLINT(cert-err52-cpp)
-  png_set_read_fn(png, &input, Input::read);
-  png_set_crc_action(png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
-  png_read_info(png, info);
-  png_get_IHDR(png, info, &header.width, &header.height, &header.depth, &header.type, &header.interlace, nullptr,
-               nullptr);
-  return true;
-}
+  explicit Header(std::span<const std::byte> bytes)
+      : depth(std::to_integer<int>(bytes[24])),
+        type(std::to_integer<int>(bytes[25])),
+        interlace(std::to_integer<int>(bytes[28])) {}
 
-bool read_rows(png_structp png, Picture& picture) {
-  if (setjmp(png_jmpbuf(png)) != 0) return false;  // NOLINT(cert-err52-cpp)
-  for (int row = 0; row < picture.height; ++row) png_read_row(png, picture.row(row), nullptr);
-  png_read_end(png, nullptr);
-  return true;
-}
-
-/// A reading or writing handle that frees itself.
-struct Handle {
-  Failure failure;
-  png_structp png = nullptr;
-  png_infop info = nullptr;
-  bool writes;
-
-  explicit Handle(bool for_writing) : writes(for_writing) {
-    png = writes ? png_create_write_struct(PNG_LIBPNG_VER_STRING, &failure, Failure::note, Failure::ignore)
-                 : png_create_read_struct(PNG_LIBPNG_VER_STRING, &failure, Failure::note, Failure::ignore);
-    info = png != nullptr ? png_create_info_struct(png) : nullptr;
-    if (info == nullptr) {
-      close();
-      throw Error(ErrorCode::kOutOfMemory, "libpng: out of memory");
-    }
-  }
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-  ~Handle() { close(); }
-
-  void close() {
-    if (writes) png_destroy_write_struct(&png, &info);
-    if (!writes) png_destroy_read_struct(&png, &info, nullptr);
+  /// 0 for those that are not read.
+  [[nodiscard]] int channels() const {
+    if (depth != 8 || interlace != 0) return 0;
+    if (type == PNG_COLOR_TYPE_GRAY) return 1;
+    return type == PNG_COLOR_TYPE_RGB ? 3 : type == PNG_COLOR_TYPE_RGB_ALPHA ? 4 : 0;
   }
 };
+
+/// libpng stops after the last row: whether the file ends as it must.
+bool has_end(std::span<const std::byte> bytes) {
+  constexpr std::array<unsigned char, 12> kEnd{0, 0, 0, 0, 'I', 'E', 'N', 'D', 0xAE, 0x42, 0x60, 0x82};
+  return bytes.size() >= kEnd.size() && std::ranges::equal(bytes.last(kEnd.size()), std::as_bytes(std::span(kEnd)));
+}
 
 }  // namespace
 
 std::vector<std::byte> encode_png(const Picture& picture) {
   ISOHF_ASSERT(picture.channels == 1 || picture.channels == 3 || picture.channels == 4);
-  Handle handle(true);
-  Sink sink;
-  if (!write_all(handle.png, handle.info, picture, sink)) {
-    throw Error(ErrorCode::kOutOfMemory, fmt::format("libpng: {}", handle.failure.text.data()));
-  }
-  return std::move(sink.bytes);
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(picture.width);
+  image.height = static_cast<png_uint_32>(picture.height);
+  image.format = format_of(picture.channels);
+  std::vector<std::byte> bytes(PNG_IMAGE_PNG_SIZE_MAX(image));
+  png_alloc_size_t size = bytes.size();
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, picture.samples.data(), 0, nullptr) == 0)
+    throw Error(ErrorCode::kOutOfMemory, fmt::format("libpng: {}", image.message));
+  bytes.resize(size);
+  return bytes;
 }
 
 Picture decode_png(std::span<const std::byte> bytes, int most) {
-  Handle handle(false);
-  const auto refuse = [&] { throw Error(ErrorCode::kCorrupt, fmt::format("PNG: {}", handle.failure.text.data())); };
-  Input input{bytes};
-  Header header;
-  if (!read_header(handle.png, handle.info, input, header)) refuse();
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  const std::unique_ptr<png_image, decltype(&png_image_free)> frees_itself(&image, &png_image_free);
+  const auto require = [](bool holds, ErrorCode code, const std::string& why) {
+    if (!holds) throw Error(code, "PNG: " + why);
+  };
+  // Warnings, where libpng would go on with what it made up, are errors as well.
+  const auto is_well = [&](int result) { return result != 0 && image.warning_or_error == 0; };
+  const int opened = png_image_begin_read_from_memory(&image, bytes.data(), bytes.size());
+  require(is_well(opened), ErrorCode::kCorrupt, image.message);
   const auto limit = static_cast<png_uint_32>(most);
-  if (header.width > limit || header.height > limit) {
-    throw Error(ErrorCode::kCorrupt, fmt::format("PNG: {} x {} pixels, at most {} x {} are possible", header.width,
-                                                 header.height, most, most));
-  }
-  const int channels = png_get_channels(handle.png, handle.info);
-  if (header.depth != 8 || header.interlace != PNG_INTERLACE_NONE || header.type == PNG_COLOR_TYPE_PALETTE ||
-      channels == 2) {
-    throw Error(ErrorCode::kUnsupported, fmt::format("PNG: {} channels of {} bits, colour type {}; 8-bit grey, RGB and "
-                                                     "RGBA without interlacing are read",
-                                                     channels, header.depth, header.type));
-  }
-  Picture picture(static_cast<int>(header.width), static_cast<int>(header.height), channels);
-  if (!read_rows(handle.png, picture)) refuse();
-  if (!input.left.empty()) throw Error(ErrorCode::kCorrupt, fmt::format("PNG: {} bytes too many", input.left.size()));
+  require(image.width <= limit && image.height <= limit, ErrorCode::kCorrupt,
+          fmt::format("{} x {} pixels, at most {} x {} are possible", image.width, image.height, most, most));
+  const Header header(bytes);
+  const int channels = header.channels();
+  require(channels != 0 && image.format == format_of(channels), ErrorCode::kUnsupported,
+          fmt::format("colour type {} of {} bits; 8-bit grey, RGB and RGBA without interlacing are read", header.type,
+                      header.depth));
+  Picture picture(static_cast<int>(image.width), static_cast<int>(image.height), channels);
+  const int read = png_image_finish_read(&image, nullptr, picture.samples.data(), 0, nullptr);
+  require(is_well(read), ErrorCode::kCorrupt, image.message);
+  require(has_end(bytes), ErrorCode::kCorrupt, "does not end with its last chunk");
   return picture;
 }
 
