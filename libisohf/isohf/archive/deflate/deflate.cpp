@@ -8,7 +8,6 @@
 #include <array>
 #include <memory>
 
-#include "isohf/archive/deflate/literal_inflater.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
 
@@ -24,7 +23,6 @@ std::vector<std::byte> deflate_bytes(std::span<const std::byte> bytes, int level
 }
 
 void inflate_exactly(std::span<const std::byte> deflated, std::span<std::byte> out) {
-  if (inflate_literals(deflated, out)) return;
   thread_local const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> decompressor(
       libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
   if (decompressor == nullptr) throw Error(ErrorCode::kOutOfMemory, "no memory for a decompressor");
