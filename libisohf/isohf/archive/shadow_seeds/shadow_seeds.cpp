@@ -6,10 +6,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/deflate/deflate_writer.h"
+#include "isohf/archive/tile/residuals/bits.h"
 #include "isohf/archive/tile/residuals/residual_symbols.h"
 #include "isohf/archive/tile/tile_payload.h"
 #include "isohf/base/assert.h"
@@ -72,10 +74,7 @@ class SymbolReader {
  private:
   std::vector<std::span<const std::byte>> streams_;
   std::vector<std::size_t> next_;
-  std::span<const std::byte> extra_;
-  std::size_t extra_next_ = 0;
-  std::uint64_t bits_ = 0;
-  unsigned bit_count_ = 0;
+  std::optional<BitReader> extra_;
 };
 
 void SymbolWriter::put(std::size_t stream, std::uint32_t value) {
@@ -116,7 +115,7 @@ SymbolReader::SymbolReader(ByteReader& reader, std::size_t streams) : next_(stre
   for (auto& count : counts) count = reader.read<std::uint32_t>();
   const auto extra_bytes = reader.read<std::uint32_t>();
   for (const std::uint32_t count : counts) streams_.push_back(reader.read_bytes(count));
-  extra_ = reader.read_bytes(extra_bytes);
+  extra_.emplace(reader.read_bytes(extra_bytes));
   if (reader.remaining() != 0) {
     throw Error(ErrorCode::kCorrupt, fmt::format("{} bytes follow the last stream", reader.remaining()));
   }
@@ -126,15 +125,8 @@ std::uint32_t SymbolReader::get(std::size_t stream) {
   if (left(stream) == 0) throw Error(ErrorCode::kCorrupt, fmt::format("stream {} ends early", stream));
   const auto symbol = static_cast<unsigned>(streams_[stream][next_[stream]++]);
   if (symbol >= symbol_limit(32)) throw Error(ErrorCode::kCorrupt, fmt::format("{} is no symbol", symbol));
-  const unsigned count = extra_bits_of_symbol(symbol);
-  while (bit_count_ < count) {
-    if (extra_next_ == extra_.size()) throw Error(ErrorCode::kCorrupt, "the extra bits end early");
-    bits_ |= static_cast<std::uint64_t>(extra_[extra_next_++]) << bit_count_;
-    bit_count_ += 8;
-  }
-  const auto extra = static_cast<std::uint32_t>(bits_ & ((std::uint64_t{1} << count) - 1));
-  bits_ >>= count;
-  bit_count_ -= count;
+  const std::uint32_t extra = extra_->take(extra_bits_of_symbol(symbol));
+  if (extra_->ran_out()) throw Error(ErrorCode::kCorrupt, "the extra bits end early");
   return zigzagged_from(symbol, extra);
 }
 
@@ -144,7 +136,7 @@ void SymbolReader::finish() const {
       throw Error(ErrorCode::kCorrupt, fmt::format("stream {} has {} symbols too many", stream, left(stream)));
     }
   }
-  if (extra_next_ != extra_.size() || bits_ != 0) throw Error(ErrorCode::kCorrupt, "extra bits are left");
+  if (!extra_->is_used_up()) throw Error(ErrorCode::kCorrupt, "extra bits are left");
 }
 
 // --- heights and casters ---
