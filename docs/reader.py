@@ -645,8 +645,9 @@ class Archive:
             self.data = file.read()
         self.read_directory()
         self.metadata = json.loads(self.member("isohf.json"))
-        require(self.metadata["format"] == "isohf" and self.metadata["version"] == 2, "another version: not supported")
+        require(self.metadata["format"] == "isohf" and self.metadata["version"] == 1, "another version: not supported")
         require(not self.metadata.get("requires"), "requires what is not known: not supported")
+        require(self.metadata.get("heights", "point") == "point", "heights that are not known: not supported")
         require("shard" not in self.metadata, "is a shard: merge it with the others first")
         raw_range = self.metadata["source"]["voids"].get("raw_range") or (0, 0)
         require(float(raw_range[0]) <= float(raw_range[1]), "raw_range is not the smaller number first")
@@ -659,7 +660,8 @@ class Archive:
             require(not name.startswith("tiles/") or tile and int(tile[1]) < self.grid["rows"] and int(tile[2]) < self.grid["columns"],
                     "no tile's name: " + name)
         digests = self.index() if "index.bin" in self.members else None
-        require(digests is not None or count <= 2 ** 22 // vertices + 64 * there, "a grid of more tiles than its members make likely")
+        most = 2 ** 22 + 1024 * there if digests is not None else 2 ** 22 // vertices + 64 * there
+        require(count <= most, "a grid of more tiles than its members make likely")
         if digests is not None:  # else another tool packed it, and its data are others
             crcs = b"".join(struct.pack("<I", zlib.crc32(self.raw(name))) for name in self.members
                             if name not in ("isohf.json", "index.bin") and self.members[name][1] < self.members.get("index.bin", (0, len(self.data)))[1])
@@ -725,7 +727,7 @@ class Archive:
         """Digests of the stored tiles by flat index, out of index.bin, all of which is checked."""
         index, digests = self.member("index.bin"), {}
         magic, version, tables, size, stands, _, _, described, crc, zero, own = self.unpack("8sII4QIIII", len(index) - 64, index)
-        require(magic == b"ISOHFIDX" and version == 2 and size == len(index) and not zero
+        require(magic == b"ISOHFIDX" and version == 1 and size == len(index) and not zero
                 and zlib.crc32(index[-64:-4]) == own, "the index's footer")
         if stands != self.members["index.bin"][1]:
             return None  # an archiver has moved members
@@ -914,7 +916,8 @@ class Archive:
             codes = self.codes(i)
             digest = hashlib.sha256(struct.pack("<%d%s" % (len(codes), self.letter), *codes)).digest()
             require(self.digests.get(i, digest) == digest, "tile %d has another digest" % i)
-            everything.update(digest)
+            if "tiles/%d/%d.tile" % divmod(i, self.grid["columns"]) in self.members:
+                everything.update(struct.pack("<Q", i) + digest)
         everything.update(struct.pack("<IIIQQddBdd", self.shape["columns"], self.shape["rows"], self.shape["levels"],
                                       self.grid["columns"], self.grid["rows"], self.metadata["extent"]["x"],
                                       self.metadata["extent"]["z"], self.kind, samples["offset"], samples["scale"]))

@@ -99,7 +99,7 @@ TEST(Metadata, RecordsHowVoidsWereTreated) {
 }
 
 TEST(Metadata, BeginsWithFormatAndVersion) {
-  EXPECT_THAT(format_metadata(full()), testing::StartsWith("{\n \"format\": \"isohf\",\n \"version\": 2,\n"));
+  EXPECT_THAT(format_metadata(full()), testing::StartsWith("{\n \"format\": \"isohf\",\n \"version\": 1,\n"));
 }
 
 TEST(Metadata, HoldsPlanesAgainstShapeAndGrid) {
@@ -133,7 +133,7 @@ TEST(Metadata, NamesWhatIsWrong) {
   const std::string json = format_metadata(full());
   const std::pair<std::pair<const char*, const char*>, const char*> cases[] = {
       {{"\"format\": \"isohf\"", "\"format\": \"other\""}, "format"},
-      {{"\"version\": 2", "\"version\": \"2\""}, "version"},
+      {{"\"version\": 1", "\"version\": \"1\""}, "version"},
       {{"\"rows\": 11", "\"rows\": 12"}, "tile_shape"},
       {{"\"rows\": 11", "\"rows\": 1e9"}, "tile_shape.rows"},
       {{"\"columns\": 12", "\"columns\": -12"}, "tile_shape.columns"},
@@ -159,14 +159,16 @@ TEST(Metadata, NamesWhatIsWrong) {
     EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
     EXPECT_THAT(error.what(), testing::HasSubstr(name));
   }
-  const char* const requiring = "\"version\": 2, \"requires\": [\"rotated lattice\"]";
+  const char* const requiring = "\"version\": 1, \"requires\": [\"rotated lattice\"]";
+  const char* const fitted = "\"version\": 1, \"heights\": \"fitted\"";
   for (const auto& [version, name] :
-       {std::pair{"\"version\": 1", "version"}, {"\"version\": 3", "version"}, {requiring, "rotated lattice"}}) {
-    const Error error = test::error_of([&] { (void)parse_metadata(replaced(json, "\"version\": 2", version)); });
+       {std::pair{"\"version\": 2", "version"}, {requiring, "rotated lattice"}, {fitted, "fitted"}}) {
+    const Error error = test::error_of([&] { (void)parse_metadata(replaced(json, "\"version\": 1", version)); });
     EXPECT_EQ(error.code(), ErrorCode::kUnsupported) << version;
     EXPECT_THAT(error.what(), testing::HasSubstr(name));
   }
-  EXPECT_NO_THROW((void)parse_metadata(replaced(json, "\"version\": 2", "\"version\": 2, \"requires\": []")));
+  for (const char* const same : {"\"version\": 1, \"requires\": []", "\"version\": 1, \"heights\": \"point\""})
+    EXPECT_EQ(format_metadata(parse_metadata(replaced(json, "\"version\": 1", same))), json) << same;
 }
 
 TEST(ShardRecord, RefusesRowsAndNumbersThatNoConversionHas) {

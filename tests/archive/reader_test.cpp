@@ -18,6 +18,8 @@
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/member_tables.h"
 #include "isohf/archive/deflate/deflate.h"
+#include "isohf/archive/metadata/shard_record.h"
+#include "isohf/archive/writer.h"
 #include "isohf/error.h"
 #include "isohf/verify.h"
 #include "support/error_of.h"
@@ -334,6 +336,58 @@ TEST_F(ArchiveReaderTest, RefusesAGridThatTheFileCannotHold) {
   metadata.member.bytes = metadata.member.compressed_bytes = json.size();
   metadata.member.crc32 = crc32(metadata.data);
   EXPECT_THAT(read_all(parts.join()), HasSubstr("tiles: 65536x65536 are stated"));
+}
+
+TEST_F(ArchiveReaderTest, RefusesAnIndexOfMoreAbsentTilesThanStoredOnesMakeLikely) {
+  // A shard may have an index of 65,536 pages of nothing, 3 MB in all. Under another name it is an archive.
+  const TileGrid grid = TileGrid::make(TileShape::make(5, 5, 1), 65536, 65536, 10.0, 10.0);
+  Metadata metadata = test::make_metadata(grid, CodeType::kU16);
+  metadata.extensions.emplace_back(kShardName, format_shard_record({"", 1, 65536, 0, 1, {0.0}}));
+  std::filesystem::remove(path());
+  ArchiveWriter writer(path(), grid, WriterOptions{});
+  writer.skip_tiles(grid.tile_count());
+  static_cast<void>(writer.finish(metadata));
+  EXPECT_EQ(ArchiveReader(path(), ArchiveReader::Shards::kRead).tables().front().columns, 65536);
+  Parts parts(test::read_bytes(path()));
+  auto& text = parts.find("isohf.json");
+  std::string json(reinterpret_cast<const char*>(text.data.data()), text.data.size());
+  json.replace(json.find("\"shard\""), 7, "\"shelf\"");
+  std::ranges::copy(std::as_bytes(std::span<const char>(json)), text.data.begin());
+  text.member.crc32 = crc32(text.data);
+  test::write_file(path(), parts.join());
+  EXPECT_THAT(test::error_of([&] { ArchiveReader{path()}; }).what(), HasSubstr("tiles: 65536x65536 are stated"));
+  // No writer makes such an archive either.
+  metadata.extensions.clear();
+  ArchiveWriter refused(folder_ / "b.isohf", grid, WriterOptions{});
+  refused.skip_tiles(grid.tile_count());
+  EXPECT_THAT(test::error_of([&] { static_cast<void>(refused.finish(metadata)); }).what(),
+              HasSubstr("an archive that cannot be read"));
+}
+
+TEST_F(ArchiveReaderTest, NamesEachMemberThatOnlyIndexOrDirectoryHas) {
+  Parts parts(good_);
+  const auto without = [&](const std::string& name, const std::string& instead) {
+    return parts.join([&](std::vector<Parts::Part>& all) {
+      for (Parts::Part& part : all) {
+        if (part.member.name == name) part.member.name = instead;
+      }
+    });
+  };
+  // The directory has another name in its place.
+  test::write_file(path(), without("tiles/0/1.tile", "tiles/2/0.tile"));
+  EXPECT_THAT(ArchiveReader(path()).check_structure(),
+              testing::AllOf(testing::Contains(HasSubstr("another name than the directory")),
+                             testing::Contains(HasSubstr("member \"tiles/0/1.tile\": the index has it"))));
+  Parts added(good_);
+  added.parts.insert(added.parts.begin() + 2, added.find("preview.png"));
+  added.parts[2].member.name = "tiles/2/0.tile";  // a void one
+  test::write_file(path(), added.join());
+  EXPECT_FALSE(ArchiveReader(path()).check_structure().empty());
+}
+
+TEST_F(ArchiveReaderTest, NegativeZeroIsNoRowOfResiduals) {
+  EXPECT_FALSE(table_place("residual/-0000000"));
+  EXPECT_EQ(table_place("residual/00000000")->row, 0);
 }
 
 TEST_F(ArchiveReaderTest, SaysWhatItIsNot) {

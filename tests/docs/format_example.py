@@ -103,7 +103,7 @@ def describe(data):
     digest = data[index : index + 32]
     hashed = struct.pack("<IIIQQddBdd", shape["columns"], shape["rows"], shape["levels"], tiles["columns"], tiles["rows"],
                          extent["x"], extent["z"], 0, samples["offset"], samples["scale"])
-    assert hashlib.sha256(digest + hashed).hexdigest() == metadata["content_sha256"]
+    assert hashlib.sha256(bytes(8) + digest + hashed).hexdigest() == metadata["content_sha256"]
     offset, scale = metadata["samples"]["offset"], metadata["samples"]["scale"]
     return f"""
 Nine elevations, `tiny.asc`:
@@ -149,7 +149,7 @@ and the footer:
 **The metadata**, whose local header of {30 + len("isohf.json")} bytes goes before them, are the {json_header[7]} bytes of JSON up to byte {json_end},
 where the directory of {end64[6]} entries in {directory_bytes} bytes begins.
 
-**The content hash** is the SHA-256 of the tile's digest and these {len(hashed)} bytes, `{metadata["content_sha256"]}`:
+**The content hash** is the SHA-256 of the tile's flat index, eight bytes of 0, of its digest and of these {len(hashed)} bytes, `{metadata["content_sha256"]}`:
 
 {hex_lines(hashed, 32)}
 **The end records**, the last 98 bytes:

@@ -33,7 +33,7 @@ struct TileEntry {
   std::uint32_t compressed_bytes = 0;
   std::uint32_t payload_bytes = 0;
   std::uint32_t payload_crc32 = 0;
-  std::uint32_t code_min = 0;  ///< as in EncodedTile
+  std::uint32_t code_min = 0;  ///< smallest and largest code that is not void; bits of floats for kF32
   std::uint32_t code_max = 0;
   bool has_voids = false;
 };
@@ -87,9 +87,9 @@ class ArchiveReader {
   [[nodiscard]] const Metadata& metadata() const;
   [[nodiscard]] const TileGrid& grid() const { return metadata().grid; }
   [[nodiscard]] const std::string& metadata_json() const;  ///< as stored, for --json
-  /// Has metadata().source.map be what the source's reference system was understood as.
+  /// Has metadata().source.map be what the source's reference system was understood as. Before other threads read.
   void set_source_map(std::shared_ptr<const ReferenceMap> map);
-  /// The same of metadata().projection->spec.map, where the archive lies on a reference system.
+  /// The same of metadata().projection->spec.map, if the archive is on a reference system. Before other threads read.
   void set_world_map(std::shared_ptr<const ReferenceMap> map);
 
   /// True where the index disagreed with the ZIP directory and tiles are found by the directory instead.
@@ -97,9 +97,9 @@ class ArchiveReader {
   /// What opening found odd, one line each, for the user.
   [[nodiscard]] const std::vector<Warning>& warnings() const;
 
-  /// Holds the whole ZIP structure against the profile of docs/archive_format.md: every directory entry, local header
-  /// and name, order, gaps and overlaps, index against directory. One line for each thing wrong; empty where all is
-  /// well.
+  /// Compares the whole file with the profile of docs/archive_format.md: every directory entry, local header and name,
+  /// order, gaps and overlaps, index and directory, the data of each member that is not a tile. One line for each thing
+  /// wrong; empty if all is well.
   [[nodiscard]] std::vector<std::string> check_structure() const;
 
   /// `plane` 0 are the tiles themselves; 1 to metadata().planes.count are the coarse planes, each with its grid,
@@ -109,8 +109,7 @@ class ArchiveReader {
   /// hash"); nullopt where the archive is read by the directory.
   [[nodiscard]] std::optional<std::array<std::byte, 32>> tile_digest(TileIndex tile, int plane = 0) const;
 
-  /// What there is of each kind of members, the tiles first, without a look at any of them. Where the archive
-  /// is read by the directory, all of it is gone through once.
+  /// What there is of each kind of members, the tiles first, without a look at any of them.
   [[nodiscard]] const std::vector<MemberTable>& tables() const;
   /// Members in none of tables(), in file order: the metadata, the index, and what other tools added.
   [[nodiscard]] const std::vector<MemberEntry>& loose_members() const;

@@ -129,7 +129,7 @@ struct PlaneInfo {
 };
 
 /// The version of the format that this build reads and writes.
-inline constexpr int kFormatVersion = 2;
+inline constexpr int kFormatVersion = 1;
 
 /// Everything about an archive but its elevations; its member isohf.json (docs/archive_format.md).
 struct Metadata {

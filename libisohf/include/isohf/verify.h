@@ -43,7 +43,8 @@ struct VerifyReport {
 
 /// Checks a whole archive: ZIP structure, index against directory, every CRC, every tile's decoding, code range, void
 /// counts and statistics against the metadata, content hash, shared vertices and padding equal between neighbours (the
-/// eight around each tile), normals equal across every edge and corner. Parallel, memory bounded by two rows of tiles.
+/// eight around each tile), normals equal across every edge and corner. Parallel. Memory: two rows of tiles, and 32
+/// bytes a member.
 /// Stage "verify". Of the findings `max_findings` are kept, the others only counted.
 /// Throws only what prevents checking at all (Error{kIo}, kCancelled).
 [[nodiscard]] VerifyReport verify_archive(const std::string& path, const Job& job = {},

@@ -31,12 +31,12 @@ class ArchiveIndexBuilder {
   void add_copy(PlaneTile tile, const ZipMember& member, const TableRecord& record, const Digest& digest);
   void add_copy(const TablePlace& place, const ZipMember& member);
   void add_data_crc32(std::uint32_t crc) { data_crc32_ = crc32_of_crc32(crc, data_crc32_); }
-  /// Takes tiles from next_tile() on that are not there, by the digest of a void one.
-  void skip(std::int64_t tiles, std::span<const std::byte> void_digest);
+  /// Takes tiles from next_tile() on that are not there.
+  void skip(std::int64_t tiles) { next_ += tiles; }
 
   [[nodiscard]] std::int64_t next_tile() const { return next_; }
-  [[nodiscard]] std::int64_t tiles_stored() const { return tables_.front().members().stored; }
-  [[nodiscard]] std::uint64_t tile_bytes() const { return tables_.front().members().compressed_bytes; }
+  [[nodiscard]] std::int64_t tiles_stored() const { return tables_[0].members().stored; }
+  [[nodiscard]] std::uint64_t tile_bytes() const { return tables_[0].members().compressed_bytes; }
   [[nodiscard]] TileStatistics statistics() const;
   /// Sums of the elevations by row of tiles, as far as there are such; statistics() adds these up in order.
   [[nodiscard]] const std::vector<double>& row_sums() const { return row_sums_; }
@@ -60,12 +60,9 @@ class ArchiveIndexBuilder {
   void add_up(const TileStatistics& tile);
   void add_entry(const ZipMember& member);
   void add_member(const std::optional<TablePlace>& place, const ZipMember& member);
-  [[nodiscard]] bool put_in_table(const TablePlace& place, const ZipMember& member);
 
   TileGrid grid_;
-  std::string folder_;
-  std::vector<TableWriter> tables_;  ///< the tiles, the coarse planes, the others
-  std::size_t tile_tables_ = 0;
+  TablesWriter tables_;
   std::vector<ZipMember> loose_;  ///< members in no table
   std::unordered_set<std::string> loose_names_;
   SpillBuffer directory_;

@@ -9,13 +9,14 @@
 #include <unordered_map>
 #include <utility>
 
+#include "isohf/archive/archive_index.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/metadata/shard_record.h"
+#include "isohf/archive/structure_check.h"
 #include "isohf/archive/tile/quantise.h"
 #include "isohf/archive/tile/tile_codes.h"
 #include "isohf/archive/tile/tile_decoder.h"
-#include "isohf/archive/tile_locator.h"
 #include "isohf/base/source_bytes.h"
 #include "isohf/error.h"
 
@@ -88,21 +89,26 @@ struct ArchiveReader::State {
   std::string json;
   std::optional<Metadata> metadata;
   std::vector<Warning> warnings;
-  std::optional<TileLocator> tiles;
-  mutable std::once_flag members_read;
-  mutable std::vector<MemberEntry> members;
-  mutable std::unordered_map<std::string_view, std::size_t> members_by_name;
-  mutable std::once_flag loose_read;
-  mutable std::vector<MemberEntry> loose;
-  mutable std::once_flag tables_read;
-  mutable std::vector<MemberTable> tables;
+  std::optional<ArchiveIndex> index;
+  /// Members in file order, and by name.
+  struct Members {
+    std::once_flag read;
+    std::vector<MemberEntry> all;
+    std::unordered_map<std::string_view, std::size_t> by_name;
+
+    void take(std::vector<MemberEntry> found);
+    [[nodiscard]] std::optional<MemberEntry> find(const std::string& name) const;
+  };
+  mutable Members members;
+  mutable Members loose;
+  std::vector<MemberTable> tables;
 
   void open();
   void refuse_shard() const;
   /// A member's data, its local header held against what is stated, in one range.
   [[nodiscard]] SourceBytes checked_data(const ZipMember& member, std::uint64_t data_offset,
                                          std::size_t& header_bytes) const;
-  [[nodiscard]] std::vector<std::byte> payload(const TileEntry& entry, TileIndex tile, int plane) const;
+  [[nodiscard]] std::vector<std::byte> payload(const TableRecord& record, TileIndex tile, int plane) const;
   void require(TileIndex tile, int plane) const;
   /// Errors of reading with the archive's name.
   template <typename Action>
@@ -115,9 +121,19 @@ struct ArchiveReader::State {
   }
   void read_members() const;
   void read_loose() const;
-  void read_tables() const;
   [[nodiscard]] std::optional<MemberEntry> find_in_tables(const std::string& wanted) const;
 };
+
+void ArchiveReader::State::Members::take(std::vector<MemberEntry> found) {
+  all = std::move(found);
+  std::ranges::sort(all, {}, &MemberEntry::offset_bytes);
+  for (std::size_t i = 0; i < all.size(); ++i) by_name.emplace(all[i].name, i);
+}
+
+std::optional<MemberEntry> ArchiveReader::State::Members::find(const std::string& wanted) const {
+  const auto found = by_name.find(wanted);
+  return found == by_name.end() ? std::nullopt : std::optional(all[found->second]);
+}
 
 ArchiveReader::State::State(std::shared_ptr<const ByteSource> bytes, const std::string& its_name) try
     : source(std::move(bytes)), file(*source), name(its_name) {
@@ -149,8 +165,9 @@ void ArchiveReader::State::open() {
     throw error.within(fmt::format("at byte {}", entry.header_offset));
   }
   json.erase(json.find_last_not_of(" \n") + 1);
-  tiles.emplace(file, end, own, *metadata);
-  if (tiles->by_directory()) {
+  index.emplace(file, end, own, *metadata);
+  for (const TableDescription& table : index->tables().tables()) tables.push_back(table.members);
+  if (index->by_directory()) {
     warnings.emplace_back("index and ZIP directory do not agree, as after repacking; tiles are found by the directory");
   }
 }
@@ -168,7 +185,7 @@ void ArchiveReader::State::refuse_shard() const {
 SourceBytes ArchiveReader::State::checked_data(const ZipMember& member, std::uint64_t data_offset,
                                                std::size_t& header_bytes) const {
   std::vector<std::byte> header;
-  if (!tiles->by_directory()) append_local_header(member, header);
+  if (!index->by_directory()) append_local_header(member, header);
   header_bytes = static_cast<std::size_t>(std::min<std::uint64_t>(header.size(), data_offset));
   SourceBytes stored(file, data_offset - header_bytes, header_bytes + member.compressed_bytes);
   // The local header must say what the index says, or the offset is not the member's.
@@ -178,14 +195,15 @@ SourceBytes ArchiveReader::State::checked_data(const ZipMember& member, std::uin
   return stored;
 }
 
-std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, TileIndex tile, int plane) const {
+std::vector<std::byte> ArchiveReader::State::payload(const TableRecord& record, TileIndex tile, int plane) const {
+  const TileEntry& entry = record.entry;
   std::size_t header_bytes = 0;
   const SourceBytes stored = checked_data({tile_name(tile, plane), ZipMethod::kDeflated, entry.payload_crc32,
                                            entry.compressed_bytes, entry.payload_bytes, 0},
                                           entry.offset_bytes, header_bytes);
   const auto data = stored.bytes().subspan(header_bytes);
   std::vector<std::byte> bytes;
-  if (tiles->is_deflated(tile, plane)) {
+  if (record.deflated) {
     bytes.resize(entry.payload_bytes);
     inflate_exactly(data, bytes);
   } else {
@@ -201,19 +219,16 @@ std::vector<std::byte> ArchiveReader::State::payload(const TileEntry& entry, Til
 }
 
 void ArchiveReader::State::read_members() const {
-  const ArchiveDirectory directory =
-      read_directory(file, end, {}, [](const std::string& what) { throw Error(ErrorCode::kCorrupt, what); });
   std::vector<MemberEntry> found;
-  for (const auto& [entry, data_offset] : directory.members) found.push_back(member_entry(entry, data_offset));
-  members = std::move(found);
-  for (std::size_t i = 0; i < members.size(); ++i) members_by_name.emplace(members[i].name, i);
+  for_each_member(file, end, Tiles::kPassedBy, [&](const ZipEntry& entry, std::uint64_t data_offset) {
+    found.push_back(member_entry(entry, data_offset));
+  });
+  members.take(std::move(found));
 }
 
 void ArchiveReader::State::read_loose() const {
   std::vector<MemberEntry> found;
-  const PagedIndex* const paged = tiles->paged();
-  const std::uint64_t in_tables = paged != nullptr ? paged->footer().in_tables : 0;
-  if (paged != nullptr && own.are_last && end.entries == in_tables + 3) {
+  if (!index->by_directory() && own.are_last && end.entries == index->tables().footer().in_tables + 3) {
     // What every archive has: media type, index, metadata.
     ZipEntry first;
     first.name = kMediaTypeName;
@@ -224,44 +239,21 @@ void ArchiveReader::State::read_loose() const {
   } else {
     for (ZipEntries entries(file, end); const auto entry = entries.next();) {
       if (is_in_tile_folder(entry->name) || entry->name.ends_with('/')) continue;
-      if (paged == nullptr ? table_place(entry->name).has_value() : find_in_tables(entry->name).has_value()) continue;
+      if (find_in_tables(entry->name)) continue;
       found.push_back(member_entry(*entry, checked_data_offset(file, *entry)));
     }
-    std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.offset_bytes < b.offset_bytes; });
   }
-  loose = std::move(found);
-}
-
-void ArchiveReader::State::read_tables() const {
-  std::vector<MemberTable> found;
-  if (const PagedIndex* const paged = tiles->paged()) {
-    for (const TableDescription& table : paged->tables()) found.push_back(table.members);
-    tables = std::move(found);
-    return;
-  }
-  found = tiles->tile_tables();
-  for (ZipEntries entries(file, end); const auto entry = entries.next();) {
-    const auto place = table_place(entry->name);
-    if (!place) continue;
-    auto table =
-        std::find_if(found.begin(), found.end(), [&](const auto& known) { return known.name == place->table; });
-    if (table == found.end()) table = found.insert(found.end(), {.name = place->table});
-    table->columns = std::max(table->columns, place->column + 1);
-    table->rows = std::max(table->rows, place->row + 1);
-    table->compressed_bytes += entry->compressed_bytes;
-    ++table->stored;
-  }
-  tables = std::move(found);
+  loose.take(std::move(found));
 }
 
 std::optional<MemberEntry> ArchiveReader::State::find_in_tables(const std::string& wanted) const {
-  const PagedIndex* const paged = tiles->paged();
-  const auto place = paged != nullptr ? table_place(wanted) : std::nullopt;
-  const auto table = place ? paged->find_table(place->table) : std::nullopt;
+  const PagedIndex& paged = index->tables();
+  const auto place = table_place(wanted);
+  const auto table = place ? paged.find_table(place->table) : std::nullopt;
   if (!table) return std::nullopt;
-  const MemberTable& members_of = paged->tables()[*table].members;
+  const MemberTable& members_of = paged.tables()[*table].members;
   if (place->column >= members_of.columns || place->row >= members_of.rows) return std::nullopt;
-  const auto record = paged->record(*table, place->row, place->column);
+  const auto record = paged.record(*table, place->row, place->column);
   if (!record) return std::nullopt;
   const TileEntry& entry = record->entry;
   return MemberEntry{
@@ -303,7 +295,7 @@ const std::string& ArchiveReader::metadata_json() const {
   return state_->json;
 }
 bool ArchiveReader::reads_by_directory() const {
-  return state_->tiles->by_directory();
+  return state_->index->by_directory();
 }
 const std::vector<Warning>& ArchiveReader::warnings() const {
   return state_->warnings;
@@ -314,7 +306,7 @@ void ArchiveReader::State::require(TileIndex tile, int plane) const {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: has {} coarse planes, plane {} is asked for", name, metadata->planes.count, plane));
   }
-  const TileGrid& grid = tiles->grids()[static_cast<std::size_t>(plane)];
+  const TileGrid& grid = index->grids()[static_cast<std::size_t>(plane)];
   if (!grid.contains(tile)) {
     throw Error(ErrorCode::kInvalidArgument, fmt::format("tile ({},{}) lies outside the grid of {}x{}", tile.column,
                                                          tile.row, grid.tile_columns(), grid.tile_rows()));
@@ -323,52 +315,46 @@ void ArchiveReader::State::require(TileIndex tile, int plane) const {
 
 TileEntry ArchiveReader::tile_entry(TileIndex tile, int plane) const {
   state_->require(tile, plane);
-  return state_->named([&] { return state_->tiles->checked_record(tile, plane); });
+  return state_->named([&] { return state_->index->checked_record(tile, plane).entry; });
 }
 
 std::optional<std::array<std::byte, 32>> ArchiveReader::tile_digest(TileIndex tile, int plane) const {
   state_->require(tile, plane);
-  return state_->named([&] { return state_->tiles->digest(tile, plane); });
+  return state_->named([&] { return state_->index->digest(tile, plane); });
 }
 
 const std::vector<MemberTable>& ArchiveReader::tables() const {
-  state_->named([&] { std::call_once(state_->tables_read, [&] { state_->read_tables(); }); });
   return state_->tables;
 }
 
 const std::vector<MemberEntry>& ArchiveReader::loose_members() const {
-  state_->named([&] { std::call_once(state_->loose_read, [&] { state_->read_loose(); }); });
-  return state_->loose;
+  state_->named([&] { std::call_once(state_->loose.read, [&] { state_->read_loose(); }); });
+  return state_->loose.all;
 }
 
 std::optional<MemberEntry> ArchiveReader::find_member(const std::string& name) const {
   if (auto found = state_->named([&] { return state_->find_in_tables(name); })) return found;
-  if (state_->tiles->paged() == nullptr) {  // all members are in the directory alone
-    const auto& all = members();
-    const auto found = state_->members_by_name.find(name);
-    return found == state_->members_by_name.end() ? std::nullopt : std::optional(all[found->second]);
-  }
-  const auto& all = loose_members();
-  const auto found = std::find_if(all.begin(), all.end(), [&](const MemberEntry& m) { return m.name == name; });
-  return found == all.end() ? std::nullopt : std::optional(*found);
+  static_cast<void>(loose_members());
+  return state_->loose.find(name);
 }
 
 const std::vector<MemberEntry>& ArchiveReader::members() const {
-  state_->named([&] { std::call_once(state_->members_read, [&] { state_->read_members(); }); });
-  return state_->members;
+  state_->named([&] { std::call_once(state_->members.read, [&] { state_->read_members(); }); });
+  return state_->members.all;
 }
 
 TileCodes ArchiveReader::read_tile(TileIndex tile, int plane) const {
-  const TileEntry entry = tile_entry(tile, plane);
+  state_->require(tile, plane);
+  const TableRecord record = state_->named([&] { return state_->index->checked_record(tile, plane); });
   const CodeType type = metadata().quantisation.type;
   const TileShape& shape = grid().shape();
-  if (!entry.stored) return void_tile(shape, metadata().quantisation);
+  if (!record.entry.stored) return void_tile(shape, metadata().quantisation);
   try {
-    return decode_tile(shape, type, state_->payload(entry, tile, plane));
+    return decode_tile(shape, type, state_->payload(record, tile, plane));
   } catch (const Error& error) {
     throw error.within(fmt::format("{}: {}tile ({},{}) at byte {}", path(),
                                    plane == 0 ? "" : fmt::format("plane {}: ", plane), tile.column, tile.row,
-                                   entry.offset_bytes));
+                                   record.entry.offset_bytes));
   }
 }
 
@@ -390,8 +376,7 @@ std::vector<std::byte> ArchiveReader::read_member(const MemberEntry& member) con
   entry.bytes = member.bytes;
   entry.header_offset = member.offset_bytes;
   return state_->named([&] {
-    if (state_->tiles->paged() == nullptr || !state_->find_in_tables(member.name))
-      return member_from(state_->file, entry, member.offset_bytes);
+    if (!state_->find_in_tables(member.name)) return member_from(state_->file, entry, member.offset_bytes);
     // Found without the directory: the member's local header has not been looked at yet.
     std::size_t header_bytes = 0;
     const SourceBytes stored = state_->checked_data(entry, member.offset_bytes, header_bytes);
@@ -400,22 +385,9 @@ std::vector<std::byte> ArchiveReader::read_member(const MemberEntry& member) con
 }
 
 std::vector<std::string> ArchiveReader::check_structure() const {
-  const State& state = *state_;
-  std::vector<std::string> found(state.warnings.begin(), state.warnings.end());
-  const auto complain = [&](const std::string& what) { found.push_back(what); };
-  try {
-    const ArchiveDirectory directory = read_directory(state.file, state.end, state.tiles->grids(), complain);
-    if (!state.tiles->by_directory()) {
-      state.tiles->check_against(directory, complain);
-      // An archive to which another tool added something is held against the rules of ZIP alone.
-      if (state.own.are_last) check_profile(state.file, state.end, complain);
-    }
-    for (const auto& [entry, data_offset] : directory.members) {
-      check_member(state.file, entry, data_offset);
-    }
-  } catch (const Error& error) {
-    complain(error.what());
-  }
+  std::vector<std::string> found(state_->warnings.begin(), state_->warnings.end());
+  const Complain complain = [&](const std::string& what) { found.push_back(what); };
+  isohf::check_structure(state_->file, *this, complain, complain);
   return found;
 }
 

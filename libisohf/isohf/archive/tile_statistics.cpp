@@ -68,6 +68,19 @@ CountedVertices::Columns CountedVertices::of_row(TileIndex tile, int row) const 
   return columns;
 }
 
+std::int64_t CountedVertices::of_tile(TileIndex tile) const {
+  const int first = tile.row > 0 ? 2 : 1;
+  const std::int64_t most = grid_.shape().rows() - 2;
+  const std::int64_t last = std::min(most, 1 + last_z_ - grid_.lattice_vertex(tile, {1, 1}).z);
+  std::int64_t count = 0;
+  // Rows of one parity count the same columns.
+  for (int row = first; row <= std::min<std::int64_t>(first + 1, last); ++row) {
+    const Columns columns = of_row(tile, row);
+    count += std::max(0, columns.last - columns.first + 1) * ((last - row) / 2 + 1);
+  }
+  return count;
+}
+
 TileStatistics tile_statistics(const CountedVertices& counted, TileIndex index, const TileCodes& tile,
                                const Quantisation& quantisation) {
   const TileShape& shape = counted.shape();

@@ -24,6 +24,8 @@ class CountedVertices {
     int last;
   };
   [[nodiscard]] Columns of_row(TileIndex tile, int row) const;
+  /// All of a tile.
+  [[nodiscard]] std::int64_t of_tile(TileIndex tile) const;
   [[nodiscard]] const TileShape& shape() const { return grid_.shape(); }
 
  private:

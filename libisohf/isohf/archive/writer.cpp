@@ -18,6 +18,7 @@
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/journal.h"
 #include "isohf/archive/metadata/accuracy_info.h"
+#include "isohf/archive/metadata/shard_record.h"
 #include "isohf/archive/tile/tile_codes.h"
 #include "isohf/base/assert.h"
 #include "isohf/base/bytes.h"
@@ -60,10 +61,7 @@ Digest job_digest(const TileGrid& grid, const WriterOptions& options) {
   writer.write(options.planes.stride);
   writer.write(options.planes.count);
   writer.write_bytes(std::as_bytes(std::span<const char>(options.job_fingerprint)));
-  const std::vector<std::byte> hash = sha256(bytes);
-  Digest digest{};
-  std::copy(hash.begin(), hash.end(), digest.begin());
-  return digest;
+  return sha256(bytes);
 }
 
 /// Returns `path`, once what an interrupted run left there is where this run wants it.
@@ -89,7 +87,6 @@ struct ArchiveWriter::State {
   std::optional<Journal> journal;
   std::uint64_t journalled = 0;  ///< bytes of the part file that the journal's file vouches for
   std::uint64_t synced = 0;
-  std::vector<std::byte> void_digest;
   std::string content_hash;       ///< once all tiles are there
   std::uint64_t members_end = 0;  ///< likewise: where index and directory begin
   bool finished = false;
@@ -152,8 +149,7 @@ JournalRecord media_type_record() {
 /// The first member, and the tiles that are not there.
 void ArchiveWriter::State::begin_contents() {
   contents.add(media_type_record());
-  void_digest = tile_content_digest(void_tile(grid.shape(), {options.type, 0.0, 1.0}));
-  contents.skip(options.first_tile, void_digest);
+  contents.skip(options.first_tile);
 }
 
 void ArchiveWriter::State::start_over() {
@@ -385,8 +381,7 @@ void ArchiveWriter::State::add_tile_member(JournalRecord::Kind kind, PlaneTile t
   end_copies();
   JournalRecord record;
   record.kind = kind;
-  ISOHF_ASSERT(encoded.content_digest.size() == record.digest.size());
-  std::copy(encoded.content_digest.begin(), encoded.content_digest.end(), record.digest.begin());
+  record.digest = encoded.content_digest;
   record.statistics = encoded.statistics;
   if (kind != JournalRecord::Kind::kEmptyTile) {
     record.member = {tile_name(tile.tile, tile.plane), ZipMethod::kDeflated,  encoded.payload_crc32,
@@ -410,7 +405,7 @@ void ArchiveWriter::add_tile(const EncodedTile& tile) {
 }
 
 void ArchiveWriter::skip_tiles(std::int64_t tiles) {
-  state_->contents.skip(tiles, state_->void_digest);
+  state_->contents.skip(tiles);
 }
 
 void ArchiveWriter::add_plane_tile(int plane, TileIndex tile, const EncodedTile& encoded,
@@ -554,6 +549,14 @@ void ArchiveWriter::complete(Metadata metadata) {
   state.members_end = state.part.position();
   metadata.planes = state.options.planes;
   metadata.tiles_stored = state.contents.tiles_stored();
+  if (static_cast<std::uint64_t>(state.grid.tile_count()) >
+          most_tiles(static_cast<std::uint64_t>(metadata.tiles_stored)) &&
+      !shard_record(metadata)) {
+    throw Error(ErrorCode::kInvalidArgument,
+                fmt::format("{}: {}x{} tiles, of which {} have an elevation, make an archive that cannot be read; "
+                            "convert the part of the source that has elevations",
+                            state.path, state.grid.tile_columns(), state.grid.tile_rows(), metadata.tiles_stored));
+  }
   metadata.content_sha256 = state.content_hash;
   metadata.ground_sha256 = ground_hash(metadata);
   std::erase_if(metadata.extensions, [](const auto& extension) { return extension.first == kDataCrcName; });

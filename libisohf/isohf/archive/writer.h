@@ -22,10 +22,9 @@ struct WriterOptions {
   bool resume = false;     ///< continue NAME.part where its journal says so, after checking what is there
   /// Identifies the job for resuming: the same text means the same input and options. Stored in the journal.
   std::string job_fingerprint;
-  PlaneInfo planes;                ///< coarse planes that add_plane_tile fills, up to as many
-  std::int64_t first_tile = 0;     ///< flat index of the first that is added; those before are not there
-  CodeType type = CodeType::kU16;  ///< of tiles that are not there
-  bool journal = true;             ///< keep one for a resume; without it a part file is never kept
+  PlaneInfo planes;             ///< coarse planes that add_plane_tile fills, up to as many
+  std::int64_t first_tile = 0;  ///< flat index of the first that is added; those before are not there
+  bool journal = true;          ///< keep one for a resume; without it a part file is never kept
 };
 
 /// Where members are copied from. What is being copied keeps it.
@@ -102,10 +101,10 @@ class ArchiveWriter {
 
   /// Makes every tile added so far readable by read_tile.
   void flush_tiles();
-  /// Decodes a tile that was added before flush_tiles(), for members that are made from the tiles as stored; also those
-  /// that a resumed job found. Any number of threads at once, but none beside the other functions.
   /// What is known of a tile that was added, or of a coarse plane's.
   [[nodiscard]] TileEntry tile_entry(TileIndex tile, int plane = 0) const;
+  /// Decodes a tile that was added before flush_tiles(), for members that are made from the tiles as stored; also those
+  /// that a resumed job found. Any number of threads at once, but none beside the other functions.
   [[nodiscard]] TileCodes read_tile(TileIndex tile, const Quantisation& quantisation, int plane = 0) const;
 
   /// Once all tiles are there: the hash that the metadata will state, by their grid and quantisation.

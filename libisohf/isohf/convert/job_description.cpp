@@ -243,7 +243,7 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.extensions.emplace_back(kStatisticsOfName, kStatisticsOfSource);
   metadata.producer = producer_of(options);
   const std::string job = fingerprint(info, plan, options, false) + (options.lossless ? " | lossless" : "");
-  const std::vector<std::byte> digest = sha256(std::as_bytes(std::span<const char>(job)));
+  const Digest digest = sha256(std::as_bytes(std::span<const char>(job)));
   metadata.extensions.emplace_back(kJobName, '"' + hex(digest) + '"');
   return metadata;
 }

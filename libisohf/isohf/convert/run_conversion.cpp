@@ -370,8 +370,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
   warn_of_plan(info, plan, options.plan, textures ? &*textures : nullptr, summary.warnings);
   refuse_warnings(summary, options);
   Conversion conversion{source, options, plan, memory, kernel, std::move(prefilter), job};
-  WriterOptions how{options.overwrite, options.resume, job_fingerprint(info, plan, options), coarse, 0,
-                    options.code_type};
+  WriterOptions how{options.overwrite, options.resume, job_fingerprint(info, plan, options), coarse};
   if (shard != nullptr) {
     conversion.first_tile = how.first_tile = shard->record.first_row * plan.grid.tile_columns();
     conversion.end_tile = shard->record.end_row * plan.grid.tile_columns();

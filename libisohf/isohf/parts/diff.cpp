@@ -45,8 +45,8 @@ std::vector<ArchiveDifference::Member> differing_members(const ArchiveReader& fi
 }
 
 /// Stated, or found by decoding where nothing is stated.
-std::vector<std::byte> tile_digest(const ArchiveReader& archive, TileIndex tile) {
-  if (const auto stated = archive.tile_digest(tile)) return {stated->begin(), stated->end()};
+Digest tile_digest(const ArchiveReader& archive, TileIndex tile) {
+  if (const auto stated = archive.tile_digest(tile)) return *stated;
   return tile_content_digest(archive.read_tile(tile));
 }
 

@@ -207,7 +207,7 @@ class Extraction {
   const Job& job_;
   CountedVertices counted_;
   TileCodes void_codes_;
-  std::vector<std::byte> void_digest_;
+  Digest void_digest_;
   std::optional<SeedRow> seeds_;
   std::vector<std::string> tables_;  ///< of textures
 };

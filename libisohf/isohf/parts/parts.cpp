@@ -98,7 +98,6 @@ WriterOptions options_while_copying(const Metadata& metadata, const PartOptions&
   how.overwrite = options.overwrite;
   how.journal = false;  // copying again takes no longer than a look at what is there
   how.planes = metadata.planes;
-  how.type = metadata.quantisation.type;
   return how;
 }
 

@@ -257,10 +257,7 @@ class Contradictions {
             fmt::format("is {}, the source's is {}", to_string(record->mapping.type), source.sample_type));
       if (record->mapping.z_scale != source.z_scale || record->mapping.z_offset != source.z_offset)
         add("lossless.z_scale, .z_offset", "are not the source's");
-      std::uint64_t bytes = 0;
-      for (const MemberEntry& member : archive_.members()) {
-        if (is_residual(member.name)) bytes += member.compressed_bytes;
-      }
+      const std::uint64_t bytes = members_in(archive_, "residual/{row:8}", is_residual).bytes;
       if (bytes != record->residual_bytes && !archive_.reads_by_directory())
         add("lossless.residual_bytes", fmt::format("is {}, the members have {}", record->residual_bytes, bytes));
     } catch (const Error&) {
@@ -275,6 +272,22 @@ class Contradictions {
 };
 
 }  // namespace
+
+MemberTotals members_in(const ArchiveReader& archive, const std::string& table,
+                        const std::function<bool(const std::string& name)>& is_one) {
+  MemberTotals totals;
+  for (const MemberTable& of : archive.tables()) {
+    if (of.name != table) continue;
+    totals.members += of.stored;
+    totals.bytes += of.compressed_bytes;
+  }
+  for (const MemberEntry& member : archive.loose_members()) {
+    if (!is_one(member.name)) continue;
+    ++totals.members;
+    totals.bytes += member.compressed_bytes;
+  }
+  return totals;
+}
 
 std::string why_other_data(const ArchiveReader& archive) {
   if (archive.reads_by_directory()) return {};

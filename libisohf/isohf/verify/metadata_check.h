@@ -1,9 +1,11 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "isohf/archive.h"
+#include "isohf/archive/tile/tile_codes.h"
 
 namespace isohf {
 
@@ -15,5 +17,9 @@ namespace isohf {
 /// How the bytes of the members, as they stand in the file, differ from those that were written; empty where they do
 /// not, or where nothing is stated of them. Reads the whole file. Throws as reading does.
 [[nodiscard]] std::string why_other_data(const ArchiveReader& archive);
+
+/// Members of a table of this name and their compressed bytes, and those in no table whose name is one.
+[[nodiscard]] MemberTotals members_in(const ArchiveReader& archive, const std::string& table,
+                                      const std::function<bool(const std::string& name)>& is_one);
 
 }  // namespace isohf

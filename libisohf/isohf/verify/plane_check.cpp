@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
+#include "isohf/archive/archive_index.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/planes/archive_planes.h"
-#include "isohf/archive/tile_locator.h"
 #include "isohf/error.h"
 #include "isohf/verify.h"
 

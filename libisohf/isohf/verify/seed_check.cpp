@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
-#include <algorithm>
-
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/error.h"
+#include "isohf/verify/metadata_check.h"
 
 namespace isohf {
 
@@ -18,33 +17,24 @@ SeedCheck::SeedCheck(const ArchiveReader& archive, const ShadowSeedInfo& info, c
   if (!has_room_for_seeds(archive.grid())) {
     throw Error(ErrorCode::kCorrupt, "shadow_seeds: a grid of so many columns has none");
   }
-  for (const MemberEntry& member : archive.members()) {
-    const auto tile = tile_from_seed_name(member.name);
-    if (tile && archive.grid().contains(*tile)) members_.emplace_back(archive.grid().flat_index(*tile), &member);
-  }
-  std::sort(members_.begin(), members_.end());
 }
 
 /// Empty where nothing is.
 std::string SeedCheck::why_wrong(TileIndex tile, const EncodedSeeds& expected) const {
-  const std::int64_t flat = archive_.grid().flat_index(tile);
-  const auto found =
-      std::lower_bound(members_.begin(), members_.end(), std::pair(flat, static_cast<const MemberEntry*>(nullptr)));
-  const bool is_there = found != members_.end() && found->first == flat;
   const bool is_due = expected.payload_bytes != 0;
-  if (is_there != is_due) {
-    return is_due ? "its shadow seeds are missing" : "has shadow seeds, but nothing casts a shadow into it";
-  }
-  if (!is_due) return {};
-  std::vector<std::byte> payload(expected.payload_bytes);
-  inflate_exactly(expected.deflated, payload);
   try {
-    if (found->second->bytes == payload.size() && archive_.read_member(*found->second) == payload) return {};
+    const auto found = archive_.find_member(seed_name(tile));
+    if (found.has_value() != is_due) {
+      return is_due ? "its shadow seeds are missing" : "has shadow seeds, but nothing casts a shadow into it";
+    }
+    if (!is_due) return {};
+    std::vector<std::byte> payload(expected.payload_bytes);
+    inflate_exactly(expected.deflated, payload);
+    if (found->bytes == payload.size() && archive_.read_member(*found) == payload) return {};
   } catch (const Error& error) {
     return error.what();
   }
-  return fmt::format("member \"{}\" holds shadow seeds that are not those of the tiles in its row",
-                     found->second->name);
+  return fmt::format("member \"{}\" has shadow seeds that are not those of the tiles in its row", seed_name(tile));
 }
 
 SeedRow::Tile SeedCheck::prepare(TileIndex index, const TileCodes* codes) const {
@@ -68,11 +58,10 @@ std::vector<SeedCheck::Problem> SeedCheck::end_row(std::int64_t row, bool check)
   return problems;
 }
 
-std::vector<SeedCheck::Problem> SeedCheck::check_record() const {
+std::vector<SeedCheck::Problem> SeedCheck::check_record() const try {
   std::vector<Problem> problems;
-  std::uint64_t bytes = 0;
-  for (const auto& [flat, member] : members_) bytes += member->compressed_bytes;
-  const auto members = static_cast<std::int64_t>(members_.size());
+  const auto is_seed = [](const std::string& name) { return tile_from_seed_name(name).has_value(); };
+  const auto [members, bytes] = members_in(archive_, "seeds/{row}/{column}.seed", is_seed);
   if (members != info_.members) {
     problems.emplace_back(std::nullopt,
                           fmt::format("{} members hold shadow seeds, the metadata says {}", members, info_.members));
@@ -83,6 +72,8 @@ std::vector<SeedCheck::Problem> SeedCheck::check_record() const {
                           fmt::format("shadow seeds take {} bytes, the metadata says {}", bytes, info_.bytes));
   }
   return problems;
+} catch (const Error& error) {
+  return {{std::nullopt, error.what()}};
 }
 
 }  // namespace isohf

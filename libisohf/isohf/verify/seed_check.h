@@ -13,8 +13,7 @@
 namespace isohf {
 
 /// Makes an archive's shadow seeds once more from its tiles. Seeds follow from the codes bit for bit, so that members
-/// must be equal to the byte. Memory: the casters of one row of tiles, unless in a scratch file, and the places of the
-/// members.
+/// must be equal to the byte. Memory: the casters of one row of tiles, unless in a scratch file.
 class SeedCheck {
  public:
   using Problem = std::pair<std::optional<TileIndex>, std::string>;
@@ -38,7 +37,6 @@ class SeedCheck {
   ShadowSeedInfo info_;
   SeedRow row_;
   SeedRow::Tiles tiles_;
-  std::vector<std::pair<std::int64_t, const MemberEntry*>> members_;  ///< by flat tile index
 };
 
 }  // namespace isohf

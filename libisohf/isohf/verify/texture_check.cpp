@@ -6,6 +6,7 @@
 #include <array>
 #include <optional>
 
+#include "isohf/archive/container/member_tables.h"
 #include "isohf/archive/textures/texture_reader.h"
 #include "isohf/error.h"
 
@@ -66,7 +67,16 @@ class TextureCheck {
     const TextureInfo& info = reader_.info();
     std::int64_t members = 0;
     std::uint64_t bytes = 0;
-    for (const MemberEntry& member : archive_.members()) {
+    for (const MemberTable& table : archive_.tables()) {
+      if (!table.name.starts_with(kTextureFolder)) continue;
+      const auto place = place_from_texture_name(info, member_name(table.name, table.rows - 1, table.columns - 1));
+      if (!place || !grid_.contains(place->tile)) {
+        problems_.push_back(fmt::format("members \"{}\" are not all levels of a tile's texture", table.name));
+      }
+      members += table.stored;
+      bytes += table.compressed_bytes;
+    }
+    for (const MemberEntry& member : archive_.loose_members()) {
       if (!member.name.starts_with(kTextureFolder)) continue;
       const auto place = place_from_texture_name(info, member.name);
       if (!place || !grid_.contains(place->tile)) {

@@ -11,14 +11,15 @@
 #include <memory>
 #include <utility>
 
+#include "isohf/archive/archive_index.h"
 #include "isohf/archive/container/archive_directory.h"
 #include "isohf/archive/container/content_hash.h"
 #include "isohf/archive/metadata/accuracy_info.h"
 #include "isohf/archive/planes/archive_planes.h"
 #include "isohf/archive/planes/plane_builder.h"
+#include "isohf/archive/structure_check.h"
 #include "isohf/archive/tile/quantise.h"
 #include "isohf/archive/tile/tile_codes.h"
-#include "isohf/archive/tile_locator.h"
 #include "isohf/archive/tile_statistics.h"
 #include "isohf/base/arena.h"
 #include "isohf/base/memory/memory_budget.h"
@@ -44,7 +45,7 @@ struct TileState {
   // Of stored tiles:
   TileCodes codes;
   std::vector<float> heights;  ///< [C*R] vertical units, NaN where void
-  std::vector<std::byte> digest;
+  Digest digest{};
   SeedRow::Tile seeds;
   std::vector<Finding> findings;
   TileStatistics statistics;
@@ -70,6 +71,9 @@ constexpr std::int64_t kLeastTilesPerThread = 8;
 /// Of each vertex of a tile in hand, beside its codes, and in each thread while tiles are decoded (measured).
 constexpr double kHeightBytes = 4.0;
 constexpr double kDecodingBytes = 40.0;
+/// Of each member, while the structure is checked; a member takes so many bytes of the file at least.
+constexpr double kMemberBytes = 32.0;
+constexpr std::uint64_t kLeastMemberBytes = 30;
 
 class Verification {
  public:
@@ -80,7 +84,6 @@ class Verification {
         grid_(archive.grid()),
         shape_(grid_.shape()),
         void_heights_(static_cast<std::size_t>(shape_.stored_vertex_count()), std::numeric_limits<float>::quiet_NaN()),
-        void_digest_(tile_content_digest(void_tile(shape_, archive.metadata().quantisation))),
         counted_(archive.metadata()) {
     first_border_row_ = shape_.rows();
     for (std::size_t i = 0; i < shared_.size(); ++i) {
@@ -96,7 +99,6 @@ class Verification {
 
   VerifyReport run() {
     check_structure();
-    const bool has_members = check_members();
     for (std::string& problem : contradictions_in(archive_)) add(make(finding::kMetadata, {}, std::move(problem)));
     start_seeds();
     if (archive_.metadata().planes.count > 0) planes_.emplace(archive_, scratch_);
@@ -110,9 +112,7 @@ class Verification {
     check_totals();
     if (seeds_) add_seed_problems(seeds_->check_record());
     check_lossless();
-    if (has_members) {
-      for (std::string& problem : check_textures(archive_)) add(make(finding::kTexture, {}, std::move(problem)));
-    }
+    for (std::string& problem : check_textures(archive_)) add(make(finding::kTexture, {}, std::move(problem)));
     // Where all else is well: members may hold the same in other bytes.
     if (report_.findings_total == 0) {
       if (std::string problem = why_other_data(archive_); !problem.empty()) {
@@ -142,32 +142,9 @@ class Verification {
       add(make(finding::kReadByDirectory, {},
                "the index disagrees with the ZIP directory; tiles are read by the directory"));
     }
-    const std::vector<Warning>& told = archive_.warnings();  // that the directory is read, which is said above
-    for (const std::string& problem : archive_.check_structure()) {
-      if (!archive_.reads_by_directory() || std::find(told.begin(), told.end(), problem) == told.end()) {
-        add(make(finding::kStructure, {}, problem));
-      }
-    }
-  }
-
-  /// False where the list of members itself is damaged.
-  bool check_members() {
-    try {
-      (void)archive_.members();
-    } catch (const Error& error) {
-      add(make(finding::kStructure, {}, error.what()));
-      return false;
-    }
-    for (const MemberEntry& member : archive_.members()) {
-      // The check of the structure went through it.
-      if (member.deflated && member.bytes > kInflatedAtOnceBytes) continue;
-      try {
-        (void)archive_.read_member(member);
-      } catch (const Error& error) {
-        add(make(finding::kMemberUnreadable, {}, error.what()));
-      }
-    }
-    return true;
+    isohf::check_structure(
+        archive_.source(), archive_, [&](const std::string& problem) { add(make(finding::kStructure, {}, problem)); },
+        [&](const std::string& problem) { add(make(finding::kMemberUnreadable, {}, problem)); });
   }
 
   void start_seeds() {
@@ -188,10 +165,13 @@ class Verification {
     const auto vertices = static_cast<double>(shape_.stored_vertex_count());
     const auto border = static_cast<double>((shape_.rows() - first_border_row_) * shape_.columns());
     const auto columns = static_cast<double>(grid_.tile_columns());
+    double members = 0.0;
+    for (const MemberTable& table : archive_.tables()) members += static_cast<double>(table.stored);
+    members = std::min(members, static_cast<double>(archive_.size_bytes() / kLeastMemberBytes));
     const double seeds = has_seeds() ? static_cast<double>(SeedRow::memory_bytes(grid_, in_scratch)) : 0.0;
     const double codes =
         archive_.metadata().quantisation.type == CodeType::kF32 ? sizeof(float) : sizeof(std::uint16_t);
-    return kProgramBytes + threads_of(job_) * (kThreadBytes + kDecodingBytes * vertices) +
+    return kProgramBytes + kMemberBytes * members + threads_of(job_) * (kThreadBytes + kDecodingBytes * vertices) +
            static_cast<double>(tiles_at_once) * vertices * (kHeightBytes + codes) +
            2.0 * columns * (border * sizeof(float) + sizeof(TileBorder)) + seeds +
            static_cast<double>(plane_builder_memory_bytes(planes_of(archive_.metadata()),
@@ -277,8 +257,7 @@ class Verification {
     });
   }
 
-  /// False where there is nothing to decode. A tile that is not stored takes neither time nor memory: only stored ones
-  /// are bounded by the file's size.
+  /// False when there is nothing to decode. Tiles that are not stored are bounded by most_tiles().
   bool find_entry(TileIndex index, TileState& tile) const {
     try {
       tile.entry = archive_.tile_entry(index);
@@ -288,12 +267,7 @@ class Verification {
     }
     if (tile.entry.stored) return true;
     tile.readable = true;
-    tile.digest = void_digest_;
-    for (int row = 1; row <= shape_.rows() - 2; ++row) {
-      const CountedVertices::Columns columns = counted_.of_row(index, row);
-      tile.statistics.vertices += std::max(0, columns.last - columns.first + 1);
-    }
-    tile.statistics.voids = tile.statistics.vertices;
+    tile.statistics.vertices = tile.statistics.voids = counted_.of_tile(index);
     return false;
   }
 
@@ -323,7 +297,7 @@ class Verification {
   void check_digest(TileIndex index, TileState& tile) const {
     try {
       const auto stated = archive_.tile_digest(index);
-      if (stated && !std::ranges::equal(*stated, tile.digest))
+      if (stated && *stated != tile.digest)
         tile.findings.push_back(
             make(finding::kContentHash, index,
                  fmt::format("its elevations have the digest {}, the index says {}", hex(tile.digest), hex(*stated))));
@@ -461,7 +435,7 @@ class Verification {
     all_.sum += tile.statistics.sum;
     all_.min = std::min(all_.min, tile.statistics.min);
     all_.max = std::max(all_.max, tile.statistics.max);
-    if (tile.readable) hash_.add_tile(tile.digest);
+    if (tile.readable && tile.entry.stored) hash_.add_tile(report_.tiles_checked - 1, tile.digest);
   }
 
   /// The source's samples, restored from tiles and residuals, against their hash.
@@ -528,7 +502,6 @@ class Verification {
   const TileGrid& grid_;
   TileShape shape_;
   std::vector<float> void_heights_;
-  std::vector<std::byte> void_digest_;
   CountedVertices counted_;
   std::array<std::vector<SharedVertex>, std::size(kComparedNeighbours)> shared_;
   std::int64_t tiles_at_once_ = 0;

@@ -43,6 +43,7 @@ TileStatistics all_tiles(const Metadata& about) {
       }
     }
     const TileStatistics found = tile_statistics(counted, grid.tile_at(i), tile, about.quantisation);
+    EXPECT_EQ(counted.of_tile(grid.tile_at(i)), found.vertices) << i;
     sum.vertices += found.vertices;
     sum.voids += found.voids;
     sum.sum += found.sum;

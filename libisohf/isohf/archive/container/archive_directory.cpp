@@ -19,47 +19,16 @@ namespace {
 constexpr std::string_view kTileFolder = "tiles/";
 constexpr std::string_view kPlaneFolder = "planes/";
 
-/// An entry and where its bytes lie in the file, local header included.
-struct Placed {
-  ZipEntry entry;
-  std::uint64_t data_offset;
-  bool is_folder;
-
-  [[nodiscard]] std::uint64_t begin() const { return entry.header_offset; }
-  [[nodiscard]] std::uint64_t end() const { return data_offset + entry.compressed_bytes; }
-};
-
-/// Complains where two members share bytes or reach into the directory at byte `limit`.
-void check_overlaps(const std::vector<Placed>& all, std::uint64_t limit, const Complain& complain) {
-  std::vector<const Placed*> sorted;
-  for (const Placed& placed : all) sorted.push_back(&placed);
-  std::sort(sorted.begin(), sorted.end(), [](const Placed* a, const Placed* b) {
-    return a->begin() != b->begin() ? a->begin() < b->begin() : a->end() < b->end();
-  });
-  const Placed* before = nullptr;
-  for (const Placed* const placed : sorted) {
-    if (placed->end() > limit)
-      complain(fmt::format("{} reaches into the directory at byte {}", describe(placed->entry), limit));
-    if (before != nullptr && before->end() > placed->begin()) {
-      complain(fmt::format("{} overlaps \"{}\", which ends at byte {}", describe(placed->entry), before->entry.name,
-                           before->end()));
-    }
-    before = placed;
-  }
+/// Of the entry that stands at a byte of the directory.
+ZipEntry entry_at(const ByteSource& file, const ZipEnd& end, std::uint64_t offset) {
+  ZipEnd rest = end;
+  rest.directory_bytes -= offset - end.directory_offset;
+  rest.directory_offset = offset;
+  return *ZipEntries(file, rest).next();
 }
 
-void check_duplicates(const std::vector<Placed>& all, const Complain& complain) {
-  std::vector<const ZipEntry*> sorted;
-  for (const Placed& placed : all) sorted.push_back(&placed.entry);
-  std::stable_sort(sorted.begin(), sorted.end(), [](const auto* a, const auto* b) { return a->name < b->name; });
-  for (std::size_t i = 1; i < sorted.size(); ++i) {
-    if (sorted[i]->name != sorted[i - 1]->name) continue;
-    complain(fmt::format("member \"{}\" is there twice, at bytes {} and {}", sorted[i]->name,
-                         sorted[i - 1]->header_offset, sorted[i]->header_offset));
-  }
-}
+}  // namespace
 
-/// Why a tile's entry cannot be a tile, one clause; empty where it can.
 std::string why_bad_tile(const ZipEntry& entry, std::span<const TileGrid> grids) {
   const auto tile = tile_from_name(entry.name);
   if (!tile) return "has no tile's name, tiles/ROW/COLUMN.tile or planes/PLANE/ROW/COLUMN.tile";
@@ -72,8 +41,6 @@ std::string why_bad_tile(const ZipEntry& entry, std::span<const TileGrid> grids)
   if (entry.bytes > 0xffffffffU || entry.compressed_bytes > 0xffffffffU) return "is larger than any tile";
   return {};
 }
-
-}  // namespace
 
 std::string tile_name(TileIndex tile, int plane) {
   return plane == 0 ? fmt::format(FMT_COMPILE("tiles/{}/{}.tile"), tile.row, tile.column)
@@ -173,46 +140,67 @@ std::uint64_t checked_data_offset(const ByteSource& file, const ZipEntry& entry)
   return data_offset;
 }
 
-ArchiveDirectory read_directory(const ByteSource& file, const ZipEnd& end, std::span<const TileGrid> grids,
-                                const Complain& complain) {
-  std::vector<Placed> all;
-  for (ZipEntries entries(file, end); auto entry = entries.next();) {
-    if (grids.empty() && is_in_tile_folder(entry->name)) continue;
-    // Archivers put in entries for folders; they hold nothing.
-    const bool is_folder = entry->name.size() > 1 && entry->name.back() == '/' && entry->bytes == 0;
-    const std::string_view name = std::string_view(entry->name).substr(0, entry->name.size() - (is_folder ? 1 : 0));
-    if (const std::string why = why_bad_name(name); !why.empty()) {
-      complain(fmt::format("{}: its name is not allowed: {}", describe(*entry), why));
-      continue;
+void MemberPlaces::add(const ZipEntry& entry, std::uint64_t data_offset) {
+  places_.push_back({std::hash<std::string>()(entry.name), entry.header_offset, data_offset + entry.compressed_bytes,
+                     entry.entry_offset});
+}
+
+void MemberPlaces::check(const ByteSource& file, const ZipEnd& end, const Complain& complain) {
+  const auto entry_of = [&](const Place& place) { return entry_at(file, end, place.entry_offset); };
+  std::ranges::sort(places_, {}, [](const Place& place) { return std::pair(place.begin, place.end); });
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    const Place& place = places_[i];
+    if (place.end > end.directory_offset) {
+      complain(
+          fmt::format("{} reaches into the directory at byte {}", describe(entry_of(place)), end.directory_offset));
     }
-    try {
-      const std::uint64_t data_offset = checked_data_offset(file, *entry);
-      all.push_back({std::move(*entry), data_offset, is_folder});
-    } catch (const Error& error) {
-      if (error.code() == ErrorCode::kIo) throw;
-      complain(error.what());
-    }
-  }
-  check_overlaps(all, end.directory_offset, complain);
-  check_duplicates(all, complain);
-  ArchiveDirectory directory;
-  for (Placed& placed : all) {
-    if (placed.is_folder) continue;
-    if (!is_in_tile_folder(placed.entry.name)) {
-      directory.members.push_back({std::move(placed.entry), placed.data_offset});
-    } else if (const std::string why = why_bad_tile(placed.entry, grids); !why.empty()) {
-      complain(fmt::format("{}: {}", describe(placed.entry), why));
-    } else {
-      const PlaneTile tile = *tile_from_name(placed.entry.name);
-      const std::int64_t flat = grids[static_cast<std::size_t>(tile.plane)].flat_index(tile.tile);
-      directory.tiles.push_back({tile.plane, flat, std::move(placed.entry), placed.data_offset});
+    if (i > 0 && places_[i - 1].end > place.begin) {
+      complain(fmt::format("{} overlaps \"{}\", which ends at byte {}", describe(entry_of(place)),
+                           entry_of(places_[i - 1]).name, places_[i - 1].end));
     }
   }
-  std::sort(directory.tiles.begin(), directory.tiles.end(),
-            [](const auto& a, const auto& b) { return a.plane != b.plane ? a.plane < b.plane : a.flat < b.flat; });
-  std::sort(directory.members.begin(), directory.members.end(),
-            [](const auto& a, const auto& b) { return a.data_offset < b.data_offset; });
-  return directory;
+  std::ranges::sort(places_, {}, [](const Place& place) { return std::pair(place.name_hash, place.entry_offset); });
+  for (std::size_t i = 1; i < places_.size(); ++i) {
+    if (places_[i].name_hash != places_[i - 1].name_hash) continue;
+    const ZipEntry first = entry_of(places_[i - 1]);
+    const ZipEntry second = entry_of(places_[i]);
+    if (first.name != second.name) continue;
+    complain(fmt::format("member \"{}\" is there twice, at bytes {} and {}", first.name, first.header_offset,
+                         second.header_offset));
+  }
+}
+
+bool is_folder(const ZipEntry& entry) {
+  return entry.name.size() > 1 && entry.name.back() == '/' && entry.bytes == 0;
+}
+
+std::optional<std::uint64_t> check_entry(const ByteSource& file, const ZipEntry& entry, const Complain& complain) {
+  const std::string_view name = std::string_view(entry.name).substr(0, entry.name.size() - (is_folder(entry) ? 1 : 0));
+  if (const std::string why = why_bad_name(name); !why.empty()) {
+    complain(fmt::format("{}: its name is not allowed: {}", describe(entry), why));
+    return std::nullopt;
+  }
+  try {
+    return checked_data_offset(file, entry);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kIo) throw;
+    complain(error.what());
+    return std::nullopt;
+  }
+}
+
+void for_each_member(const ByteSource& file, const ZipEnd& end, Tiles tiles,
+                     const std::function<void(const ZipEntry& entry, std::uint64_t data_offset)>& visit) {
+  const Complain refuse = [](const std::string& what) { throw Error(ErrorCode::kCorrupt, what); };
+  MemberPlaces places;
+  ZipEntry entry;
+  for (ZipEntries entries(file, end); entries.read(entry);) {
+    if (tiles == Tiles::kPassedBy && is_in_tile_folder(entry.name)) continue;
+    const std::uint64_t data_offset = *check_entry(file, entry, refuse);
+    places.add(entry, data_offset);
+    if (!is_folder(entry)) visit(entry, data_offset);
+  }
+  places.check(file, end, refuse);
 }
 
 OwnEntries find_own_entries(const ByteSource& file, const ZipEnd& end) {
@@ -249,49 +237,6 @@ OwnEntries find_own_entries(const ByteSource& file, const ZipEnd& end) {
                 fmt::format("is a ZIP file, but no isohf archive: it has no member \"{}\"", kMetadataName));
   }
   return found;
-}
-
-void check_profile(const ByteSource& file, const ZipEnd& end, const Complain& complain) {
-  std::vector<std::byte> ours;
-  const auto stands_at = [&](std::uint64_t offset) {
-    if (offset > file.size_bytes() || ours.size() > file.size_bytes() - offset) return false;
-    const SourceBytes theirs(file, offset, ours.size());
-    return std::equal(ours.begin(), ours.end(), theirs.bytes().begin());
-  };
-  const std::uint32_t media_type_crc = crc32(std::as_bytes(std::span(kMediaType)));
-  const std::array<std::pair<std::uint64_t, std::string_view>, 3> places = {
-      {{0, kMediaTypeName}, {end.entries - 2, kIndexName}, {end.entries - 1, kMetadataName}}};
-  std::uint64_t offset = 0;
-  std::uint64_t entries = 0;
-  for (ZipEntries all(file, end); const auto entry = all.next(); ++entries) {
-    ours.clear();
-    append_directory_entry(*entry, ours);
-    if (!stands_at(entry->entry_offset)) {
-      complain(fmt::format("{}: its directory entry at byte {} is not as the profile has it", describe(*entry),
-                           entry->entry_offset));
-    }
-    if (entry->header_offset != offset)
-      complain(fmt::format("{}: the member before it ends at byte {}", describe(*entry), offset));
-    for (const auto& [place, name] : places) {
-      if (entries == place && entry->name != name)
-        complain(fmt::format("{}: stands where \"{}\" belongs", describe(*entry), name));
-    }
-    if (entry->name == kMediaTypeName && (entry->method != ZipMethod::kStored || entry->crc32 != media_type_crc))
-      complain(fmt::format("{}: must hold \"{}\", stored", describe(*entry), kMediaType));
-    ours.clear();
-    append_local_header(*entry, ours);
-    if (!stands_at(entry->header_offset))
-      complain(fmt::format("{}: its local header is not as the profile has it", describe(*entry)));
-    offset = entry->header_offset + ours.size() + entry->compressed_bytes;
-  }
-  ours.clear();
-  append_end_records(end.entries, end.directory_offset, end.directory_bytes, ours);
-  if (ours.size() != file.size_bytes() - end.records_offset || !stands_at(end.records_offset))
-    complain(fmt::format("the end records at byte {} are not as the profile has them", end.records_offset));
-  if (offset != end.directory_offset) {
-    complain(
-        fmt::format("the directory begins at byte {}, the last member ends at byte {}", end.directory_offset, offset));
-  }
 }
 
 namespace {
@@ -374,20 +319,29 @@ std::vector<std::byte> member_from(std::span<const std::byte> data, const ZipEnt
 }
 
 void check_member(const ByteSource& file, const ZipEntry& entry, std::uint64_t data_offset) {
-  if (entry.method != ZipMethod::kDeflated || entry.bytes <= kInflatedAtOnceBytes) {
+  // A deflated member may claim a thousand times the bytes that it has, and a stored one may be large.
+  constexpr std::uint64_t kAtOnceBytes = std::uint64_t{1} << 20U;
+  const bool is_deflated = entry.method == ZipMethod::kDeflated;
+  if (entry.bytes <= kAtOnceBytes || (!is_deflated && entry.method != ZipMethod::kStored)) {
     static_cast<void>(member_from(file, entry, data_offset));
     return;
   }
-  const SourceBytes data(file, data_offset, entry.compressed_bytes);
   std::uint32_t crc = 0;
   std::uint64_t bytes = 0;
-  const bool is_stream = inflate_in_pieces(data.bytes(), [&](std::span<const std::byte> piece) {
-    crc = crc32(piece, crc);
-    bytes += piece.size();
-    return bytes <= entry.bytes;
-  });
-  if (is_stream && bytes == entry.bytes && crc == entry.crc32) return;
-  throw Error(ErrorCode::kCorrupt, fmt::format("{}: does not inflate to {} bytes of the CRC-32 {:08x}", describe(entry),
+  bool is_whole = true;
+  if (is_deflated) {
+    const SourceBytes data(file, data_offset, entry.compressed_bytes);
+    is_whole = inflate_in_pieces(data.bytes(), [&](std::span<const std::byte> piece) {
+      crc = crc32(piece, crc);
+      bytes += piece.size();
+      return bytes <= entry.bytes;
+    });
+  } else {
+    bytes = entry.compressed_bytes;
+    crc = crc32_in(file, data_offset, bytes);
+  }
+  if (is_whole && bytes == entry.bytes && crc == entry.crc32) return;
+  throw Error(ErrorCode::kCorrupt, fmt::format("{}: has no data of {} bytes and the CRC-32 {:08x}", describe(entry),
                                                entry.bytes, entry.crc32));
 }
 

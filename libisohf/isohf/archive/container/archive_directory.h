@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <functional>
 #include <optional>
 #include <span>
@@ -12,7 +15,7 @@
 #include "isohf/lattice.h"
 #include "isohf/metadata.h"
 
-/// An archive as a ZIP file: its members' names, and its directory held against the rules of docs/archive_format.md.
+/// An archive as a ZIP file: its members' names, and its directory compared with the rules of docs/archive_format.md.
 
 namespace isohf {
 
@@ -40,37 +43,42 @@ struct PlaneTile {
 /// Why a name may not stand in an archive, one clause; empty where it may.
 [[nodiscard]] std::string why_bad_name(std::string_view name);
 
-/// An archive's directory, read whole and checked: names, duplicates, local headers, overlaps.
-struct ArchiveDirectory {
-  struct Tile {
-    int plane;
-    std::int64_t flat;
-    ZipEntry entry;
-    std::uint64_t data_offset;
-  };
-  struct Member {
-    ZipEntry entry;
-    std::uint64_t data_offset;
-  };
-
-  std::vector<Tile> tiles;      ///< by plane and flat index
-  std::vector<Member> members;  ///< the others, in file order
-};
-
 /// What a check hands its findings to, as text. It may throw, or take note and return.
 using Complain = std::function<void(const std::string&)>;
 
 /// The end record of an archive. Throws Error{kCorrupt} where there is none or it contradicts the file.
 [[nodiscard]] ZipEnd find_archive_end(const ByteSource& file);
 
-/// Reads and checks the directory of a file whose tiles belong to `grids`, by plane; with none the members alone, and
-/// tiles go unread. What is wrong goes to `complain`; the entry at fault is left out.
-[[nodiscard]] ArchiveDirectory read_directory(const ByteSource& file, const ZipEnd& end,
-                                              std::span<const TileGrid> grids, const Complain& complain);
+/// Finds members of one name, and members that share bytes or reach into the directory. Memory: 32 bytes a member.
+class MemberPlaces {
+ public:
+  void add(const ZipEntry& entry, std::uint64_t data_offset);
+  /// Sorts what was added.
+  void check(const ByteSource& file, const ZipEnd& end, const Complain& complain);
 
-/// Holds an archive of ours against the profile beyond what makes a ZIP file: the directory in file order and as the
-/// writer makes it, members back to back from byte 0 on, the media type first, index and metadata last.
-void check_profile(const ByteSource& file, const ZipEnd& end, const Complain& complain);
+ private:
+  struct Place {
+    std::size_t name_hash;
+    std::uint64_t begin;  ///< of the local header
+    std::uint64_t end;    ///< of the data
+    std::uint64_t entry_offset;
+  };
+  std::deque<Place> places_;  ///< which grows without a copy
+};
+
+/// Whether an entry is a folder's: archivers add such, and they hold nothing.
+[[nodiscard]] bool is_folder(const ZipEntry& entry);
+/// Why a member in the folder of tiles or planes cannot be a tile, one clause; empty where it can.
+[[nodiscard]] std::string why_bad_tile(const ZipEntry& entry, std::span<const TileGrid> grids);
+/// Offset of a member's data; nullopt when its name or its local header breaks a rule, which goes to `complain`.
+[[nodiscard]] std::optional<std::uint64_t> check_entry(const ByteSource& file, const ZipEntry& entry,
+                                                       const Complain& complain);
+
+/// Goes through the directory in its order, and refuses what breaks a rule of docs/archive_format.md: names,
+/// duplicates, local headers, overlaps. Tiles are visited, or passed by unread.
+enum class Tiles { kVisited, kPassedBy };
+void for_each_member(const ByteSource& file, const ZipEnd& end, Tiles tiles,
+                     const std::function<void(const ZipEntry& entry, std::uint64_t data_offset)>& visit);
 
 /// The entries of index and metadata, by which an archive is opened.
 struct OwnEntries {
@@ -90,10 +98,7 @@ struct OwnEntries {
                                                  std::uint64_t data_offset);
 /// The same of its data.
 [[nodiscard]] std::vector<std::byte> member_from(std::span<const std::byte> data, const ZipEntry& entry);
-/// A deflated member may claim a thousand times the bytes that it has: one that claims more than this is looked through
-/// in pieces.
-inline constexpr std::uint64_t kInflatedAtOnceBytes = std::uint64_t{16} << 20U;
-/// Checks what member_from checks.
+/// Checks what member_from checks, in pieces.
 void check_member(const ByteSource& file, const ZipEntry& entry, std::uint64_t data_offset);
 
 /// CRC-32 over the CRC-32s of the data of all members before the index as they stand in the file, in the directory's

@@ -2,10 +2,12 @@
 
 #include <nettle/sha2.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "isohf/base/bytes.h"
 
@@ -24,13 +26,13 @@ void Sha256::add(std::span<const std::byte> bytes) {
   sha256_update(&state_->context, bytes.size(), reinterpret_cast<const std::uint8_t*>(bytes.data()));
 }
 
-std::vector<std::byte> Sha256::finish() {
-  std::vector<std::byte> digest(SHA256_DIGEST_SIZE);
+Digest Sha256::finish() {
+  Digest digest;
   sha256_digest(&state_->context, digest.size(), reinterpret_cast<std::uint8_t*>(digest.data()));
   return digest;
 }
 
-std::vector<std::byte> sha256(std::span<const std::byte> bytes) {
+Digest sha256(std::span<const std::byte> bytes) {
   Sha256 hash;
   hash.add(bytes);
   return hash.finish();
@@ -46,7 +48,7 @@ std::string hex(std::span<const std::byte> digest) {
   return text;
 }
 
-std::vector<std::byte> tile_content_digest(const TileCodes& tile) {
+Digest tile_content_digest(const TileCodes& tile) {
   if (tile.type == CodeType::kU16) return sha256(std::as_bytes(std::span(tile.codes)));
   std::vector<std::byte> bytes;
   if (tile.type == CodeType::kU8) {
@@ -61,6 +63,13 @@ std::vector<std::byte> tile_content_digest(const TileCodes& tile) {
     store_little(bytes.data() + i * sizeof(bits), bits);
   }
   return sha256(bytes);
+}
+
+void ContentHash::add_tile(std::int64_t flat, const Digest& digest) {
+  std::array<std::byte, sizeof flat> index;
+  store_little(index.data(), static_cast<std::uint64_t>(flat));
+  hash_.add(index);
+  hash_.add(digest);
 }
 
 std::string ContentHash::finish(const Metadata& metadata) {

@@ -14,7 +14,7 @@ namespace isohf {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x58444946484f5349;  // "ISOHFIDX"
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 1;
 constexpr std::uint32_t kStored = 1;
 constexpr std::uint32_t kHasVoids = 2;
 constexpr std::uint32_t kNotDeflated = 4;
@@ -270,7 +270,7 @@ std::optional<TablePlace> table_place(std::string_view name) {
   std::string_view digits = name.substr(kResiduals.size());
   std::int64_t row = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), row);
-  if (error != std::errc{} || end != digits.data() + digits.size() || row < 0 || row >= kMaxTilesPerAxis)
+  if (error != std::errc{} || end != digits.data() + digits.size() || digits.front() == '-' || row >= kMaxTilesPerAxis)
     return std::nullopt;
   return TablePlace{fmt::format("{}{}", kResiduals, kRow8), row, 0};
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -10,13 +9,12 @@
 #include <vector>
 
 #include "isohf/archive.h"
+#include "isohf/archive/tile/tile_codes.h"
 
 /// The member index.bin: tables of records in pages, their roots, the tables' descriptions, a footer
 /// (docs/archive_format.md, "Index"). What stands here says how each of these reads in bytes.
 
 namespace isohf {
-
-using Digest = std::array<std::byte, 32>;  ///< SHA-256
 
 inline constexpr std::size_t kRecordBytes = 32;
 inline constexpr std::size_t kRootEntryBytes = 48;
@@ -71,6 +69,11 @@ struct TablesFooter {
 [[nodiscard]] std::uint32_t page_records_for(std::uint64_t records);
 /// Bytes of a page: a bit for each record, then those that are stored.
 [[nodiscard]] std::uint64_t page_bytes(std::uint64_t records, std::uint32_t stored);
+
+/// Tiles that a grid may have, of which so many are stored: whoever goes through a grid must come to an end.
+[[nodiscard]] constexpr std::uint64_t most_tiles(std::uint64_t stored) {
+  return (std::uint64_t{1} << 22U) + 1024 * stored;
+}
 
 /// How many of a page's records stand before the i-th, by its bits; nullopt where that one is not stored.
 [[nodiscard]] std::optional<std::size_t> rank_in_page(std::span<const std::byte> bits, std::uint64_t i);

@@ -82,18 +82,19 @@ PagedIndex::Bytes PagedIndex::cached(std::uint64_t offset_bytes, std::uint64_t s
     const std::lock_guard lock(mutex_);
     if (const auto found = places_.find(offset_bytes); found != places_.end()) {
       recent_.splice(recent_.begin(), recent_, found->second);
-      if (recent_.front().second->size() == size_bytes) return recent_.front().second;
+      const Recent& known = recent_.front();
+      if (known.bytes->size() == size_bytes && known.crc == crc) return known.bytes;
     }
   }
   Bytes bytes = range(offset_bytes, size_bytes, crc, table);
   const std::lock_guard lock(mutex_);
   if (places_.count(offset_bytes) != 0) return bytes;
-  recent_.emplace_front(offset_bytes, bytes);
+  recent_.push_front({offset_bytes, crc, bytes});
   places_[offset_bytes] = recent_.begin();
   recent_bytes_ += size_bytes;
   while (recent_bytes_ > kMostCachedBytes && recent_.size() > 1) {
-    recent_bytes_ -= recent_.back().second->size();
-    places_.erase(recent_.back().first);
+    recent_bytes_ -= recent_.back().bytes->size();
+    places_.erase(recent_.back().offset);
     recent_.pop_back();
   }
   return bytes;

@@ -71,8 +71,13 @@ class PagedIndex {
   std::vector<TableDescription> tables_;
   mutable std::mutex mutex_;
   mutable std::vector<Bytes> roots_;
-  mutable std::list<std::pair<std::uint64_t, Bytes>> recent_;  ///< by last use, the latest first
-  mutable std::unordered_map<std::uint64_t, std::list<std::pair<std::uint64_t, Bytes>>::iterator> places_;
+  struct Recent {
+    std::uint64_t offset;
+    std::uint32_t crc;
+    Bytes bytes;
+  };
+  mutable std::list<Recent> recent_;  ///< by last use, the latest first
+  mutable std::unordered_map<std::uint64_t, std::list<Recent>::iterator> places_;
   mutable std::uint64_t recent_bytes_ = 0;
   mutable Bytes ranked_;  ///< the page in which a place was counted last
   mutable PlaceInPage ranked_place_{0, 0};

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <functional>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "isohf/archive/container/member_tables.h"
 #include "isohf/base/memory/spill_buffer.h"
+#include "isohf/base/zip.h"
 
 namespace isohf {
 
@@ -14,7 +17,7 @@ namespace isohf {
 class TableWriter {
  public:
   /// rows  0 where they are not known before the last; page_records  0 for what suits the table's size
-  TableWriter(std::string name, std::int64_t columns, std::int64_t rows, bool has_digests, const std::string& folder);
+  TableWriter(std::string name, std::int64_t columns, std::int64_t rows, bool has_digests, const ScratchFolder& folder);
 
   [[nodiscard]] const MemberTable& members() const { return table_.members; }
   /// False where the place is not behind the one before, or outside the table.
@@ -50,6 +53,41 @@ class TableWriter {
   std::vector<std::pair<std::uint64_t, RootEntry>> closed_;  ///< by page; offsets in pages_ and digests_
   SpillBuffer pages_;
   SpillBuffer digests_;
+};
+
+/// A member's record, without a range.
+[[nodiscard]] TableRecord record_of(const ZipMember& member, std::uint64_t data_offset);
+
+/// The tables of an archive while they are written: the tiles, the coarse planes, and those of other members in the
+/// order in which they are made.
+class TablesWriter {
+ public:
+  /// grids  by plane; has_digests  of tiles; folder  for scratch files
+  TablesWriter(const std::vector<TileGrid>& grids, bool has_digests, ScratchFolder folder);
+
+  [[nodiscard]] TableWriter& operator[](std::size_t table) { return tables_[table]; }
+  [[nodiscard]] const TableWriter& operator[](std::size_t table) const { return tables_[table]; }
+  [[nodiscard]] const std::vector<TableWriter>& all() const { return tables_; }
+  /// Whether there is such a coarse plane.
+  [[nodiscard]] bool has_plane(int plane) const { return plane >= 1 && static_cast<std::size_t>(plane) < planes_; }
+  /// The table that takes another member now; nullopt when none does, and it is loose.
+  [[nodiscard]] std::optional<std::size_t> find_or_make(const TablePlace& place, const ZipMember& member);
+
+  /// Ends all tables, and places them in index.bin. The footer lacks what only the file knows.
+  [[nodiscard]] TablesFooter place();
+  /// Hands over index.bin in pieces.
+  void put(const TablesFooter& footer, const std::function<void(std::span<const std::byte>)>& take) const;
+
+ private:
+  /// As they come in index.bin: the coarse planes last.
+  [[nodiscard]] std::vector<std::size_t> order() const;
+
+  ScratchFolder folder_;
+  std::vector<TableWriter> tables_;
+  std::size_t planes_;
+  std::int64_t columns_;  ///< of plane 0
+  std::int64_t rows_;
+  std::vector<std::byte> tail_;  ///< roots and descriptions
 };
 
 }  // namespace isohf

@@ -56,6 +56,15 @@ void version_members(JsonMembers& json, const Metadata& metadata) {
   }
 }
 
+/// How a stored elevation follows from the source's surface: "point" is its elevation at the vertex, and the default.
+void height_members(JsonMembers& json) {
+  constexpr const char* kPoint = "point";
+  std::optional<std::string> heights;
+  json("heights", heights, kAbsent);
+  if (heights.value_or(kPoint) == kPoint) return;
+  throw Error(ErrorCode::kUnsupported, fmt::format("metadata: heights: \"{}\" is not known to this build", *heights));
+}
+
 void plane_members(JsonMembers& json, PlaneInfo& planes) {
   json("stride", planes.stride, {.least = 2, .most = 1 << (kMaxTileLevels - 1)});
   json("count", planes.count, {.least = 1, .most = 24});
@@ -253,6 +262,7 @@ void source_members(JsonMembers& json, SourceRecord& source) {
 
 void metadata_members(JsonMembers& json, Metadata& metadata) {
   version_members(json, metadata);
+  height_members(json);
   json("producer", metadata.producer);
   grid_members(json, metadata.grid, metadata.tiles_stored);
   auto planes = metadata.planes.count > 0 ? std::optional(metadata.planes) : std::nullopt;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cstring>
 #include <limits>
 #include <optional>
@@ -12,6 +11,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "isohf/archive/container/member_tables.h"
 #include "isohf/base/assert.h"
 
 namespace isohf {
@@ -42,20 +42,16 @@ std::int64_t kept_rows(const Planes& planes, int plane) {
                       planes.grid(plane - 1).tile_rows() * (sample_rows(planes) - 1) + 1);
 }
 
-bool is_less(CodeType type, std::uint32_t a, std::uint32_t b) {
-  return type == CodeType::kF32 ? std::bit_cast<float>(a) < std::bit_cast<float>(b) : a < b;
-}
-
 /// Of all tiles below one.
 struct Range {
   bool is_void = true;
   std::uint32_t min = 0;
   std::uint32_t max = 0;
 
-  void add(CodeType type, const PlaneSample& sample) {
+  void add(const PlaneSample& sample) {
     if (sample.is_void) return;
-    if (is_void || is_less(type, sample.code_min, min)) min = sample.code_min;
-    if (is_void || is_less(type, max, sample.code_max)) max = sample.code_max;
+    if (is_void || code_less(sample.code_min, min)) min = sample.code_min;
+    if (is_void || code_less(max, sample.code_max)) max = sample.code_max;
     is_void = false;
   }
 };
@@ -167,7 +163,7 @@ class PlaneBuilder::Level {
     const TileIndex tile = fine().tile_at(next_++);
     const TileIndex above = planes_.above(tile);
     if (above.row >= row_) {
-      ranges_[static_cast<std::size_t>(above.row - row_)][static_cast<std::size_t>(above.column)].add(type_, sample);
+      ranges_[static_cast<std::size_t>(above.row - row_)][static_cast<std::size_t>(above.column)].add(sample);
     }
     if (sample.codes.empty()) return;
     const std::int64_t columns = sample_columns(planes_) - 1;
@@ -389,7 +385,7 @@ PlaneSample PlaneBuilder::sample_of(int plane, TileIndex tile, const Read& read)
   const TileRange below = planes_.below(plane, tile);
   for (TileIndex at = below.first; at.row < below.end.row; ++at.row) {
     for (at.column = below.first.column; at.column < below.end.column; ++at.column) {
-      range.add(type_, sample_of(plane - 1, at, read));
+      range.add(sample_of(plane - 1, at, read));
     }
   }
   none.is_void = range.is_void;

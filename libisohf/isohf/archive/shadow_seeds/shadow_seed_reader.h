@@ -9,10 +9,10 @@
 namespace isohf {
 
 /// Reads an archive's shadow seeds: the exact shadow height at any tile's edge, touching no other tile.
-/// Thread-safe. Memory: 8 bytes a tile. The archive must outlive it.
+/// Thread-safe. The archive must outlive it.
 class ShadowSeedReader {
  public:
-  /// Finds the members. Throws Error{kInvalidArgument} where the archive has no seeds; kCorrupt, kUnsupported.
+  /// Throws Error{kInvalidArgument} where the archive has no seeds; kCorrupt, kUnsupported.
   explicit ShadowSeedReader(const ArchiveReader& archive);
 
   [[nodiscard]] const ShadowSeedInfo& info() const { return info_; }

@@ -10,11 +10,10 @@
 
 namespace isohf {
 
-/// Reads an archive's textures, any level of any tile, from any number of threads at once.
-/// Memory: 16 bytes a member. The archive must outlive it.
+/// Reads an archive's textures, any level of any tile, from any number of threads at once. The archive must outlive it.
 class TextureReader {
  public:
-  /// Finds the members. Throws Error{kInvalidArgument} where the archive has no textures; kCorrupt, kUnsupported.
+  /// Throws Error{kInvalidArgument} where the archive has no textures; kCorrupt, kUnsupported.
   explicit TextureReader(const ArchiveReader& archive);
 
   [[nodiscard]] const TextureInfo& info() const { return info_; }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -8,6 +9,8 @@
 #include "isohf/archive.h"
 
 namespace isohf {
+
+using Digest = std::array<std::byte, 32>;  ///< SHA-256
 
 /// What is known of one tile's visible vertices; the writer journals it and adds the tiles up in order.
 struct TileStatistics {
@@ -31,9 +34,9 @@ struct EncodedTile {
   std::uint32_t code_min = 0;       ///< smallest and largest code that is not void; float bits for kF32
   std::uint32_t code_max = 0;
   bool has_voids = false;
-  bool is_empty = false;                  ///< every vertex is void: nothing to store
-  TileStatistics statistics;              ///< filled in by whoever made the codes
-  std::vector<std::byte> content_digest;  ///< SHA-256 of the codes, little-endian, void included: 32 bytes
+  bool is_empty = false;      ///< every vertex is void: nothing to store
+  TileStatistics statistics;  ///< filled in by whoever made the codes
+  Digest content_digest{};    ///< of the codes, little-endian, void included
 };
 
 /// Members of one folder and their compressed bytes.
