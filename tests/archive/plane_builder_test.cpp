@@ -248,5 +248,21 @@ TEST(PlaneBuilder, GoesOnAfterAnyTileAsIfItHadNeverStoppedInMemoryAndInAScratchF
   }
 }
 
+TEST(PlaneBuilder, NegativeZeroComesBeforeZeroWhicheverTileIsFirst) {
+  const TileGrid grid = TileGrid::make(TileShape::make(8, 7, 2), 2, 1, 1.0, 1.0);
+  const Planes planes(grid, 2, 1, false);
+  for (const float first : {0.0F, -0.0F}) {
+    Recorder recorder(planes, CodeType::kF32);
+    TileCodes tile = void_tile(grid.shape(), {CodeType::kF32, 0.0, 1.0});
+    for (const float height : {first, -first}) {
+      std::ranges::fill(tile.heights, height);
+      recorder.builder.add(sample_of(recorder.builder, grid.shape(), tile));
+    }
+    const EncodedTile& made = recorder.made.at({1, 0, 0}).encoded;
+    EXPECT_EQ(made.code_min, bits(-0.0F));
+    EXPECT_EQ(made.code_max, bits(0.0F));
+  }
+}
+
 }  // namespace
 }  // namespace isohf
