@@ -57,16 +57,11 @@ std::uint64_t page_bytes(std::uint64_t records, std::uint32_t stored) {
 }
 
 std::optional<std::size_t> rank_in_page(std::span<const std::byte> bits, std::uint64_t i) {
-  return rank_in_page(bits, i, {0, 0});
-}
-
-std::optional<std::size_t> rank_in_page(std::span<const std::byte> bits, std::uint64_t i, const PlaceInPage& known) {
   const auto last = std::to_integer<unsigned>(bits[i / 8]);
   if ((last >> (i % 8) & 1U) == 0) return std::nullopt;
   const auto count = [](std::uint64_t word) { return static_cast<std::size_t>(std::popcount(word)); };
-  // From a whole byte on, eight at a time.
-  std::size_t byte = known.bit / 8;
-  std::size_t rank = known.rank - count(std::to_integer<unsigned>(bits[byte]) & ((1U << (known.bit % 8)) - 1));
+  std::size_t byte = 0;
+  std::size_t rank = 0;
   for (; byte + 8 <= i / 8; byte += 8) {
     std::uint64_t word = 0;
     std::memcpy(&word, bits.data() + byte, sizeof word);

@@ -77,13 +77,6 @@ struct TablesFooter {
 
 /// How many of a page's records stand before the i-th, by its bits; nullopt where that one is not stored.
 [[nodiscard]] std::optional<std::size_t> rank_in_page(std::span<const std::byte> bits, std::uint64_t i);
-/// The same where it is known of a bit at or before it how many stand before that.
-struct PlaceInPage {
-  std::uint64_t bit;
-  std::size_t rank;
-};
-[[nodiscard]] std::optional<std::size_t> rank_in_page(std::span<const std::byte> bits, std::uint64_t i,
-                                                      const PlaceInPage& known);
 
 void append_record(const TableRecord& record, std::vector<std::byte>& out);
 void append_root_entry(const RootEntry& entry, std::vector<std::byte>& out);

@@ -123,32 +123,23 @@ PagedIndex::Bytes PagedIndex::page(std::size_t table, std::uint64_t page, const 
   return cached(entry.page_offset, page_bytes(of.records_of(page), entry.stored), entry.page_crc32, of);
 }
 
-/// Who goes from place to place counts on from the last one.
-std::optional<std::size_t> PagedIndex::rank(const Bytes& page, std::size_t bits, std::uint64_t bit) const {
-  PlaceInPage known{0, 0};
-  {
-    const std::lock_guard lock(mutex_);
-    if (ranked_ == page && ranked_place_.bit <= bit) known = ranked_place_;
-  }
-  const auto found = rank_in_page(std::span(*page).first(bits), bit, known);
-  if (!found) return found;
-  const std::lock_guard lock(mutex_);
-  ranked_ = page;
-  ranked_place_ = {bit, *found};
-  return found;
-}
-
-std::optional<TableRecord> PagedIndex::record(std::size_t table, std::int64_t row, std::int64_t column) const {
+std::optional<PagedIndex::Place> PagedIndex::find(std::size_t table, std::int64_t row, std::int64_t column) const {
   const TableDescription& of = tables_[table];
-  const auto flat = static_cast<std::uint64_t>(row * of.members.columns + column);
-  const std::uint64_t number = flat / of.page_records;
+  const auto slot = static_cast<std::uint64_t>(row * of.members.columns + column);
+  const std::uint64_t number = slot / of.page_records;
   const RootEntry entry = root_entry(table, number);
   if (entry.stored == 0) return std::nullopt;
   const Bytes bytes = page(table, number, entry);
   const std::size_t bits = (of.records_of(number) + 7) / 8;
-  const auto rank = this->rank(bytes, bits, flat % of.page_records);
+  const auto rank = rank_in_page(std::span(*bytes).first(bits), slot % of.page_records);
   if (!rank) return std::nullopt;
-  return record_at(of, entry, *bytes, bits + *rank * kRecordBytes, row, column);
+  return Place{entry, bytes, bits + *rank * kRecordBytes, *rank};
+}
+
+std::optional<TableRecord> PagedIndex::record(std::size_t table, std::int64_t row, std::int64_t column) const {
+  const auto place = find(table, row, column);
+  if (!place) return std::nullopt;
+  return record_at(tables_[table], place->entry, *place->page, place->record_at, row, column);
 }
 
 TableRecord PagedIndex::record_at(const TableDescription& of, const RootEntry& entry, std::span<const std::byte> page,
@@ -159,15 +150,10 @@ TableRecord PagedIndex::record_at(const TableDescription& of, const RootEntry& e
 }
 
 std::optional<Digest> PagedIndex::digest(std::size_t table, std::int64_t row, std::int64_t column) const {
-  const TableDescription& of = tables_[table];
-  const auto flat = static_cast<std::uint64_t>(row * of.members.columns + column);
-  const std::uint64_t number = flat / of.page_records;
-  const RootEntry entry = root_entry(table, number);
-  if (entry.stored == 0 || !of.has_digests) return std::nullopt;
-  const Bytes bits = page(table, number, entry);
-  const auto rank = this->rank(bits, (of.records_of(number) + 7) / 8, flat % of.page_records);
-  if (!rank || *rank >= entry.stored) return std::nullopt;
-  return digest_at(*digests_of(of, entry), *rank);
+  if (!tables_[table].has_digests) return std::nullopt;
+  const auto place = find(table, row, column);
+  if (!place || place->rank >= place->entry.stored) return std::nullopt;
+  return digest_at(*digests_of(tables_[table], place->entry), place->rank);
 }
 
 PagedIndex::Bytes PagedIndex::digests_of(const TableDescription& of, const RootEntry& entry) const {

@@ -54,7 +54,14 @@ class PagedIndex {
                             const TableDescription& table) const;
   [[nodiscard]] Bytes cached(std::uint64_t offset_bytes, std::uint64_t size_bytes, std::uint32_t crc,
                              const TableDescription& table) const;
-  [[nodiscard]] std::optional<std::size_t> rank(const Bytes& page, std::size_t bits, std::uint64_t bit) const;
+  /// Where a member that is there stands in its page.
+  struct Place {
+    RootEntry entry;
+    Bytes page;
+    std::size_t record_at;  ///< byte of the page
+    std::size_t rank;       ///< among those that are there
+  };
+  [[nodiscard]] std::optional<Place> find(std::size_t table, std::int64_t row, std::int64_t column) const;
   [[nodiscard]] RootEntry root_entry(std::size_t table, std::uint64_t page) const;
   /// A page's bits and records.
   [[nodiscard]] Bytes page(std::size_t table, std::uint64_t page, const RootEntry& entry) const;
@@ -79,8 +86,6 @@ class PagedIndex {
   mutable std::list<Recent> recent_;  ///< by last use, the latest first
   mutable std::unordered_map<std::uint64_t, std::list<Recent>::iterator> places_;
   mutable std::uint64_t recent_bytes_ = 0;
-  mutable Bytes ranked_;  ///< the page in which a place was counted last
-  mutable PlaceInPage ranked_place_{0, 0};
 };
 
 }  // namespace isohf

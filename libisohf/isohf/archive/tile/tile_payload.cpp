@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "isohf/archive/tile/predict/context_energy.h"
+#include "isohf/archive/tile/residuals/bits.h"
 #include "isohf/archive/tile/residuals/pair_coding.h"
 #include "isohf/error.h"
 
@@ -185,9 +186,7 @@ std::vector<std::byte> pack_void_mask(std::span<const std::uint8_t> is_void) {
   std::uint8_t of = 0;
   for (auto at = is_void.begin(); at != is_void.end(); of ^= 1U) {
     const auto end = std::find(at, is_void.end(), static_cast<std::uint8_t>(of ^ 1U));
-    auto run = static_cast<std::size_t>(end - at);
-    for (; run >= 128; run >>= 7U) packed.push_back(static_cast<std::byte>(128 | (run & 127)));
-    packed.push_back(static_cast<std::byte>(run));
+    append_leb128(static_cast<std::size_t>(end - at), packed);
     at = end;
   }
   return packed;
@@ -199,20 +198,11 @@ std::vector<std::uint8_t> unpack_void_mask(std::span<const std::byte> packed, st
   std::size_t filled = 0;
   std::size_t voids = 0;
   std::uint8_t of = 0;
-  for (std::size_t i = 0; i < packed.size(); of ^= 1U) {
-    std::uint64_t run = 0;
-    unsigned shift = 0;
-    const std::size_t start = i;
-    unsigned byte = 128;
-    while (byte >= 128) {
-      if (i == packed.size()) refuse_payload("its last run is cut off");
-      if (shift > 28) refuse_payload(fmt::format("its run at byte {} is too long a number", start));
-      byte = std::to_integer<unsigned>(packed[i++]);
-      run |= std::uint64_t{byte & 127U} << shift;
-      shift += 7;
-    }
-    if (byte == 0 && (start != 0 || i - start > 1))
-      refuse_payload(fmt::format("its run at byte {} is not in shortest form", start));
+  for (bool is_first = true; !packed.empty(); of ^= 1U, is_first = false) {
+    const auto taken = take_leb128(packed);
+    if (!taken) refuse_payload("a run is cut off, too long a number, or not in shortest form");
+    const std::size_t run = *taken;
+    if (run == 0 && !is_first) refuse_payload("a run behind the first is empty");
     if (run > samples - filled) refuse_payload(fmt::format("its runs add up to more than {} samples", samples));
     std::fill_n(is_void.begin() + static_cast<std::ptrdiff_t>(filled), run, of);
     filled += run;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "isohf/archive/tile/residuals/bits.h"
 #include "isohf/archive/tile/tile_payload.h"
 #include "isohf/base/bytes.h"
 #include "isohf/error.h"
@@ -18,22 +19,12 @@ enum : std::uint8_t { kHasVoids = 1, kHasWeights = 2, kIsWide = 4, kHasEightStat
   throw Error(ErrorCode::kCorrupt, "tile header: " + why);
 }
 
-void write_size(std::size_t size, ByteWriter& writer) {
-  for (; size >= 128; size >>= 7U) writer.write(static_cast<std::uint8_t>(128 | (size & 127)));
-  writer.write(static_cast<std::uint8_t>(size));
-}
-
 std::size_t read_size(ByteReader& reader) {
-  std::size_t size = 0;
-  for (unsigned shift = 0; shift <= 28; shift += 7) {
-    const auto byte = reader.read<std::uint8_t>();
-    size |= std::size_t{byte & 127U} << shift;
-    if (byte < 128) {
-      if (byte == 0 && shift != 0) refuse_tables("a size is not in shortest form");
-      return size;
-    }
-  }
-  refuse_tables("a size is too long a number");
+  std::span<const std::byte> rest = reader.rest();
+  const auto size = take_leb128(rest);
+  if (!size) refuse_tables("a size is cut off, too long a number, or not in shortest form");
+  static_cast<void>(reader.read_bytes(reader.remaining() - rest.size()));
+  return *size;
 }
 
 void read_weights(AdaptivePayload& payload, bool is_wide, ByteReader& reader) {
@@ -68,11 +59,11 @@ void write_adaptive_payload(const AdaptivePayload& payload, std::span<const std:
   }
   if (!payload.is_void.empty()) {
     const std::vector<std::byte> mask = pack_void_mask(payload.is_void);
-    write_size(mask.size(), writer);
+    append_leb128(mask.size(), out);
     writer.write_bytes(mask);
   }
   for (const std::uint32_t state : payload.states) writer.write(state);
-  write_size(words.size(), writer);
+  append_leb128(words.size(), out);
   writer.write_bytes(std::as_bytes(words));
   writer.write_bytes(extra);
 }

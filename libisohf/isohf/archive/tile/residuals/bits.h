@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,6 +13,25 @@
 /// Numbers of some bits each, the lowest bit of a byte first.
 
 namespace isohf {
+
+/// A LEB128 number: 7 bits a byte, low ones first, bit 7 set on all but the last.
+inline void append_leb128(std::size_t value, std::vector<std::byte>& out) {
+  for (; value >= 128; value >>= 7U) out.push_back(static_cast<std::byte>(128 | (value & 127)));
+  out.push_back(static_cast<std::byte>(value));
+}
+
+/// Takes such a number of five bytes at most from the front; nullopt when it is cut off, longer, or not in shortest form.
+inline std::optional<std::size_t> take_leb128(std::span<const std::byte>& bytes) {
+  std::size_t value = 0;
+  for (std::size_t i = 0; i < std::min<std::size_t>(bytes.size(), 5); ++i) {
+    const auto byte = std::to_integer<unsigned>(bytes[i]);
+    value |= std::size_t{byte & 127U} << (7 * i);
+    if (byte >= 128) continue;
+    bytes = bytes.subspan(i + 1);
+    return byte == 0 && i > 0 ? std::nullopt : std::optional(value);
+  }
+  return std::nullopt;
+}
 
 /// Bits from a span, the lowest of a byte first; zeros past its end.
 class BitReader {
