@@ -25,7 +25,7 @@ Modules& modules() {
   return instance;
 }
 
-std::vector<std::filesystem::path> folders(const std::string& named) {
+std::vector<std::filesystem::path> module_folders(const std::string& named) {
   std::vector<std::filesystem::path> list;
   if (!named.empty()) list.emplace_back(named);
   std::error_code error;
@@ -59,7 +59,7 @@ const void* load_module(const ModuleFile& module) {
   const void*& table = state.by_file[module.file];
   if (table != nullptr) return table;
   std::string searched;
-  for (const std::filesystem::path& folder : folders(state.folder)) {
+  for (const std::filesystem::path& folder : module_folders(state.folder)) {
     const std::filesystem::path file = folder / module.file;
     std::error_code error;
     if (std::filesystem::exists(file, error)) return table = load_from(file, module);
@@ -73,7 +73,7 @@ const void* load_module(const ModuleFile& module) {
 std::string find_beside_program(const std::string& file) {
   Modules& state = modules();
   const std::lock_guard lock(state.mutex);
-  for (const std::filesystem::path& folder : folders(state.folder)) {
+  for (const std::filesystem::path& folder : module_folders(state.folder)) {
     std::error_code error;
     if (std::filesystem::exists(folder / file, error)) return folder / file;
   }
