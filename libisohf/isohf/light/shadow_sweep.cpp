@@ -26,6 +26,9 @@ constexpr double kStepsToFullWidth = 2.0;
 /// Depths are cut off beyond what light falls on so many steps. Less makes teeth of borders on steep ground, whose
 /// depth changes by more from vertex to vertex.
 constexpr double kDeepestSteps = 4.0;
+/// The same for ground above the shadow. A vertex that casts a shadow lies far above the one that it is in itself, and
+/// its own begins at the vertex: more makes its shadow begin too far behind it, less makes lit ground dark.
+constexpr double kHighestSteps = 1.25;
 
 /// Between two heights; not above the middle, so that it casts no farther than both whatever the rounding.
 float middle(float a, float b) {
@@ -129,7 +132,8 @@ ShadowSweep::ShadowSweep(const TileGrid& grid, const WorldBounds& ground, const 
                .offset = -0.5 * width,
                .least = width,
                .most = width,
-               .deepest = std::max(*sun.softness, 2.0 * fall)}};
+               .deepest = std::max(*sun.softness, 2.0 * fall),
+               .highest = std::max(*sun.softness, 2.0 * fall)}};
     range_ = edges_.front().deepest / width;
     return;
   }
@@ -140,7 +144,8 @@ ShadowSweep::ShadowSweep(const TileGrid& grid, const WorldBounds& ground, const 
                       .side = 0.5,
                       .steep = steep,
                       .most = fall,
-                      .deepest = kDeepestSteps * fall};
+                      .deepest = kDeepestSteps * fall,
+                      .highest = kHighestSteps * fall};
   edges_ = {upper, upper};
   edges_[1].fall = step * sun.lower_fall;
   edges_[1].side = -0.5;
@@ -162,9 +167,10 @@ ShadowSweep::State ShadowSweep::entering(std::int64_t tile_row, const CasterRows
   if (columns_before_ == 0) return {};  // padding there is beyond all tiles
   const TileShape& shape = grid_.shape();
   const auto lines = static_cast<std::size_t>(shape.rows()) + 1;
-  State state(2 * edges_.size() * lines, kVoidHeight);
-  const ShadowFront::Casting columns = casting_columns();
-  const ShadowFront::Casting casting = casting_rows(tile_row);
+  const std::size_t carried = ShadowFront::carried_by(edges_.size());
+  State state(carried * lines, kVoidHeight);
+  const Casting columns = casting_columns();
+  const Casting casting = casting_rows(tile_row);
   for (std::size_t e = 0; e < edges_.size(); ++e) {
     for (int row = 1; row <= visible_rows(shape); ++row) {
       const auto casts = [&](double distance, float height) {
@@ -192,9 +198,10 @@ ShadowSweep::State ShadowSweep::entering(std::int64_t tile_row, const CasterRows
       const float before = casts(padding_distance(row), mirrored_ ? stored[last + 1] : stored[0]);
       meet(before, padding_distance(row));
       if (padding_distance(row) > 1) meet(middle(before, casts(0.0, mirrored_ ? stored[last] : stored[1])), 1);
-      float* const line = state.data() + 2 * e * lines + static_cast<std::size_t>(row) + 1;
+      float* const line = state.data() + 3 * e * lines + static_cast<std::size_t>(row) + 1;
       line[0] = highest;
       line[lines] = static_cast<float>(ran);
+      line[2 * lines] = 0.0F;  // along rows lines pass through the vertices
     }
   }
   return state;
@@ -202,34 +209,33 @@ ShadowSweep::State ShadowSweep::entering(std::int64_t tile_row, const CasterRows
 
 std::uint64_t ShadowSweep::state_bytes() const {
   const auto lanes = static_cast<double>(half_steps_ * grid_.tile_columns());
-  return static_cast<std::uint64_t>(lanes * (by_columns_ ? shift_ : 1.0) * 2.0 * static_cast<double>(edges_.size()) *
-                                    sizeof(float)) +
-         64;
+  const auto carried = static_cast<double>(ShadowFront::carried_by(edges_.size()));
+  return static_cast<std::uint64_t>(lanes * (by_columns_ ? shift_ * (carried + 1.0) : carried) * sizeof(float)) + 64;
 }
 
 double ShadowSweep::passing_bytes() const {
   const TileShape& shape = grid_.shape();
   if (by_columns_) return 2.0 * sizeof(float) * static_cast<double>(kTilesTogether * shape.stored_vertex_count());
-  // What lines carry, what is hidden under them, the ground there, what is found; rows of vertices.
+  // The lines, the ground of two steps, the hidden part; rows of vertices.
   const auto tiles = static_cast<double>(grid_.tile_columns());
-  return tiles * sizeof(float) *
-         ((3.0 + 2.0 * static_cast<double>(edges_.size())) * half_steps_ + 2.0 * shape.columns());
+  const auto carried = static_cast<double>(ShadowFront::carried_by(edges_.size()));
+  return tiles * sizeof(float) * ((3.0 + carried) * half_steps_ + 2.0 * shape.columns());
 }
 
-ShadowFront::Casting ShadowSweep::casting_columns() const {
+ShadowSweep::Casting ShadowSweep::casting_columns() const {
   const double first = ground_.x0 / grid_.sigma_x();
   const double last = ground_.x1 / grid_.sigma_x();
   const auto end = static_cast<double>(half_steps_ * grid_.tile_columns());
-  return mirrored_ ? ShadowFront::Casting{end - last, end - first} : ShadowFront::Casting{first, last};
+  return mirrored_ ? Casting{end - last, end - first} : Casting{first, last};
 }
 
 /// In stored rows of a tile of that row, turned over where light comes from the South.
-ShadowFront::Casting ShadowSweep::casting_rows(std::int64_t tile_row) const {
+ShadowSweep::Casting ShadowSweep::casting_rows(std::int64_t tile_row) const {
   const double north = static_cast<double>(tile_row) * grid_.shape().cell_rows() - 1.0;
   const double first = ground_.z0 / grid_.sigma_z() - north;
   const double last = ground_.z1 / grid_.sigma_z() - north;
   const double end = grid_.shape().rows() - 1.0;
-  return from_south_ ? ShadowFront::Casting{end - last, end - first} : ShadowFront::Casting{first, last};
+  return from_south_ ? Casting{end - last, end - first} : Casting{first, last};
 }
 
 ShadowSweep::State ShadowSweep::pass(std::int64_t tile_row, const State& entering, const TileRowValues& heights,
@@ -245,32 +251,50 @@ ShadowSweep::State ShadowSweep::pass_along_rows(std::int64_t tile_row, const Sta
   const TileShape& shape = grid_.shape();
   const auto lanes = static_cast<int>(half_steps_ * grid_.tile_columns()) + 1;
   const std::int64_t row_of_light = rows_before_ + (from_south_ ? grid_.tile_rows() - 1 - tile_row : tile_row);
-  ShadowFront front(lanes, shift_, edges_, range_);
-  front.resume(row_of_light * shape.cell_rows(), entering.empty() ? front.lines() : entering);
+  ShadowFront front(lanes, ShadowFront::Lanes::kAreNone, shift_, edges_, range_);
+  front.resume(row_of_light * shape.cell_rows(), entering);
   State leaving;
-  const ShadowFront::Casting columns = casting_columns();
-  const ShadowFront::Casting rows = casting_rows(tile_row);
-  std::vector<float> profile(static_cast<std::size_t>(lanes) + 2, kVoidHeight);
-  std::vector<float> found(static_cast<std::size_t>(lanes));
+  const Casting columns = casting_columns();
+  const Casting rows = casting_rows(tile_row);
+  const std::size_t held = static_cast<std::size_t>(lanes) + 2;
+  std::vector<float> profile(held + ShadowFront::kOverrun, kVoidHeight);
+  std::vector<float> profile_before = profile;
+  ShadowFront::Step before;
+  std::vector<float> found(static_cast<std::size_t>(lanes) + 1 + ShadowFront::kOverrun);
   std::vector<float> values;
   std::vector<float> made(hidden != nullptr ? static_cast<std::size_t>(grid_.tile_columns() * shape.columns()) : 0);
-  for (int step = 1; step <= shape.cell_rows() + 1; ++step) {
+  // Step 0 is the padding.
+  for (int step = 0; step <= shape.cell_rows() + 1; ++step) {
     const int row = from_south_ ? shape.rows() - 1 - step : step;
     const std::span<const float> vertices = heights.row(row, 0, grid_.tile_columns(), values);
     for (std::int64_t tile = 0; tile < grid_.tile_columns(); ++tile) {
       spread(shape, vertices.data() + tile * shape.columns(), row % 2 != 0, profile.data() + 1 + tile * half_steps_);
     }
-    if (mirrored_) std::reverse(profile.begin(), profile.end());
+    if (mirrored_) std::reverse(profile.begin(), profile.begin() + static_cast<std::ptrdiff_t>(held));
     if (step == shape.cell_rows() + 1) leaving = front.lines();
-    const bool casts = step >= rows.first - kAtEnd && step <= rows.last + kAtEnd;
-    front.advance(profile.data() + 1, casts ? columns : ShadowFront::Casting{1.0, 0.0},
-                  hidden != nullptr ? found.data() : nullptr);
-    if (hidden == nullptr) continue;
-    if (mirrored_) std::reverse(found.begin(), found.end());
+    const Casting casting = step >= rows.first - kAtEnd && step <= rows.last + kAtEnd ? columns : Casting{1.0, 0.0};
+    const ShadowFront::Step here{profile.data() + 1, casting.first, casting.last, row % 2 != 0 ? 0 : 1,
+                                 row % 2 != 0 ? 0 : half_steps_};
+    if (step > 0) front.advance(before, here, hidden != nullptr ? found.data() : nullptr);
+    before = here;
+    std::swap(profile, profile_before);
+    if (hidden == nullptr || step == 0) continue;
+    const auto more = found.begin() + ShadowFront::first_of_more(lanes);
+    const bool is_odd = row % 2 != 0;
+    if (mirrored_) {
+      std::reverse(found.begin(), found.begin() + (is_odd ? lanes + 1 : lanes - 1) / 2);
+      std::reverse(more, more + grid_.tile_columns() + 1);
+    }
     for (std::int64_t tile = 0; tile < grid_.tile_columns(); ++tile) {
       float* const out = made.data() + tile * shape.columns();
-      const float* const from = found.data() + tile * half_steps_;
-      for (int c = 1; c <= last_visible_column(shape, row); ++c) out[c] = from[half_step(shape, c, row)];
+      const float* const from = found.data() + tile * shape.cell_columns();
+      if (is_odd) {
+        std::copy_n(from, shape.cell_columns() + 1, out + 1);
+        continue;
+      }
+      out[1] = more[tile];
+      std::copy_n(from, shape.cell_columns(), out + 2);
+      out[2 + shape.cell_columns()] = more[tile + 1];
     }
     hidden->write_row(row, 0, made);
   }
@@ -283,17 +307,18 @@ ShadowSweep::State ShadowSweep::pass_along_columns(std::int64_t tile_row, const 
                                                    const TileRowValues& heights, TileRowValues* hidden) {
   const TileShape& shape = grid_.shape();
   const int lanes = shape.rows();
-  ShadowFront front(lanes, shift_, edges_, range_);
-  front.resume(columns_before_ * half_steps_, travel() && !entering.empty() ? entering : front.lines());
+  ShadowFront front(lanes, ShadowFront::Lanes::kAreSides, shift_, edges_, range_);
+  front.resume(columns_before_ * half_steps_, travel() ? entering : State());
   State leaving;
   std::size_t entered = 0;
-  const ShadowFront::Casting columns = casting_columns();
-  const ShadowFront::Casting rows = casting_rows(tile_row);
+  const Casting columns = casting_columns();
+  const Casting rows = casting_rows(tile_row);
   const std::size_t across = static_cast<std::size_t>(half_steps_) + 1;
   const std::size_t lane_stride = static_cast<std::size_t>(lanes) + 2;
   std::vector<float> spread_rows(across * static_cast<std::size_t>(lanes));
-  std::vector<float> profiles(lane_stride * across, kVoidHeight);
-  std::vector<float> found(static_cast<std::size_t>(lanes) * across);
+  std::vector<float> profiles(lane_stride * across + ShadowFront::kOverrun, kVoidHeight);
+  const std::size_t found_stride = static_cast<std::size_t>(lanes) + 1;
+  std::vector<float> found(found_stride * across + ShadowFront::kOverrun);
   std::int64_t steps = 0;
   for (std::int64_t k = 0; k < grid_.tile_columns(); k += kTilesTogether) {
     const std::int64_t tiles = std::min(kTilesTogether, grid_.tile_columns() - k);
@@ -326,28 +351,45 @@ ShadowSweep::State ShadowSweep::pass_along_columns(std::int64_t tile_row, const 
       // The first column is the last one of the tile before.
       const bool is_first = k + i == 0;
       if (!is_first) {
-        std::copy_n(found.begin() + static_cast<std::ptrdiff_t>(half_steps_) * lanes, lanes, found.begin());
+        std::copy_n(found.data() + found_stride * (across - 1), found_stride, found.data());
       }
       for (std::size_t x = is_first ? 0 : 1; x < across; ++x, ++steps) {
         if (front.is_shifting()) {
+          // With the line goes the ground beyond the padding, where it crosses a side on this step.
+          float* const profile = profiles.data() + x * lane_stride + 1;
           front.append_arriving(lanes - 3, leaving);
-          front.let_in(entered < entering.size() ? entering.data() + entered : nullptr);
+          leaving.push_back(profile[lanes - 4]);
+          const bool arrives = entered < entering.size();
+          front.let_in(arrives ? entering.data() + entered : nullptr);
           entered += front.carried();
+          profile[-1] = arrives ? entering[entered] : kVoidHeight;
+          ++entered;
         }
-        const auto at = static_cast<double>(steps);
-        const bool casts = at >= columns.first - kAtEnd && at <= columns.last + kAtEnd;
-        front.advance(profiles.data() + x * lane_stride + 1, casts ? rows : ShadowFront::Casting{1.0, 0.0},
-                      found.data() + x * static_cast<std::size_t>(lanes));
+        const auto step = [&](std::size_t at) {
+          const double behind = static_cast<double>(steps) - static_cast<double>(x - at);
+          const bool casts = behind >= columns.first - kAtEnd && behind <= columns.last + kAtEnd;
+          const Casting casting = casts ? rows : Casting{1.0, 0.0};
+          return ShadowFront::Step{profiles.data() + at * lane_stride + 1, casting.first, casting.last,
+                                   at % 2 == 0 ? 1 : 0, at == 0 || at + 1 == across ? 1 : 0};
+        };
+        front.advance(x > 0 ? step(x - 1) : ShadowFront::Step{}, step(x),
+                      hidden != nullptr ? found.data() + x * found_stride : nullptr);
       }
       if (hidden == nullptr) continue;
       for (int row = 1; row <= lanes - 2; ++row) {
-        const auto lane = static_cast<std::size_t>(from_south_ ? lanes - 1 - row : row);
-        float* const out = made.data() + row * stride + column;
-        for (int c = 1; c <= last_visible_column(shape, row); ++c) {
+        // Odd rows have vertices in even columns, where lanes from 1 on come first.
+        const auto place = static_cast<std::size_t>(from_south_ ? lanes - 1 - row : row) / 2;
+        const auto at = [&](int c, std::size_t to) {
           const int x = half_step(shape, c, row);
-          out[c] =
-              found[static_cast<std::size_t>(mirrored_ ? half_steps_ - x : x) * static_cast<std::size_t>(lanes) + lane];
-        }
+          return found[static_cast<std::size_t>(mirrored_ ? half_steps_ - x : x) * found_stride + to];
+        };
+        float* const out = made.data() + row * stride + column;
+        const int last = last_visible_column(shape, row);
+        for (int c = 1; c <= last; ++c) out[c] = at(c, place);
+        if (row % 2 != 0) continue;
+        const std::size_t slid = place + static_cast<std::size_t>(ShadowFront::first_of_more(lanes));
+        out[1] = at(1, slid);
+        out[last] = at(last, slid);
       }
     }
     for (int row = 1; hidden != nullptr && row <= lanes - 2; ++row) {

@@ -108,8 +108,13 @@ class ShadowSweep {
                         TileRowValues* hidden);
   State pass_along_columns(std::int64_t tile_row, const State& entering, const TileRowValues& heights,
                            TileRowValues* hidden);
-  [[nodiscard]] ShadowFront::Casting casting_columns() const;
-  [[nodiscard]] ShadowFront::Casting casting_rows(std::int64_t tile_row) const;
+  /// Columns or rows whose ground casts shadows, fractional; none if last < first.
+  struct Casting {
+    double first;
+    double last;
+  };
+  [[nodiscard]] Casting casting_columns() const;
+  [[nodiscard]] Casting casting_rows(std::int64_t tile_row) const;
 
   TileGrid grid_;
   WorldBounds ground_;
