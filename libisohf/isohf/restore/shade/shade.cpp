@@ -46,7 +46,7 @@ constexpr std::int64_t kBlockRows = 16;
 constexpr double kRowsOfFile = 4.0;
 constexpr double kFileBytes = 12.0e6;
 /// Of a point, for rows of either kind: between which vertices it lies.
-constexpr double kPointBytes = 12.0;
+constexpr double kPointBytes = 18.0;
 
 /// The colours of an archive's textures, for places that lie a given distance apart.
 class ShadeTexture {
@@ -182,6 +182,50 @@ ISOHF_KERNEL void between_rows(const float* north, const float* south, float sha
   for (int i = 0; i < count; ++i) out[i] = north[i] + share * (south[i] - north[i]);
 }
 
+/// The same, and slopes there, heights per half step. per_half_step is 1 over the half steps between the vertices.
+ISOHF_KERNEL void between_vertices_with_slopes(const float* row, const std::int32_t* west, const std::int32_t* east,
+                                               const float* share, const float* per_half_step, int count,
+                                               float* __restrict out, float* __restrict slopes) {
+  for (int i = 0; i < count; ++i) {
+    const float from = row[west[i]];
+    const float rise = row[east[i]] - from;
+    out[i] = from + share[i] * rise;
+    slopes[i] = per_half_step[i] * rise;
+  }
+}
+
+/// How the sun stands over the triangles between an odd row and an even one. All in heights.
+struct FacetSun {
+  float along;   ///< towards the sun for one half step East
+  float across;  ///< and for one row, from the odd to the even one
+  float fall;    ///< of the light from the sun's middle
+  float gain;    ///< part of the sun that one more unit of rise hides
+};
+
+/// The part of the sun that triangles hide from their own points, if it is more than what is hidden already.
+///
+///   odd row   0-------2     u: half steps from the vertex of the odd row to the West
+///              \  A  / \    A: |u - 1| <= 1 - down, has its base on the odd row
+///   even row    1---/-B-3   B: has its base on the even row
+///
+/// down  0...1 from the odd row to the even one
+ISOHF_KERNEL void hide_by_facets(const float* odd, const float* even, const float* odd_slope, const float* even_slope,
+                                 const float* from_vertex, int count, float down, FacetSun sun,
+                                 float* __restrict hidden) {
+  for (int i = 0; i < count; ++i) {
+    const float u = from_vertex[i];
+    const float off = u > 1.0F ? u - 1.0F : 1.0F - u;
+    const bool has_odd_base = off <= 1.0F - down;
+    const float to_odd_apex = u < 1.0F ? -u : 2.0F - u;
+    const float to_apex = has_odd_base ? 1.0F - u : to_odd_apex;
+    const float base = has_odd_base ? odd_slope[i] : even_slope[i];
+    const float between = even[i] - odd[i] + (even_slope[i] - odd_slope[i]) * to_apex;
+    const float rise = sun.along * base + sun.across * between;
+    const float part = 0.5F + (rise - sun.fall) * sun.gain;
+    hidden[i] = part > hidden[i] ? part : hidden[i];
+  }
+}
+
 /// The share of the sun that is seen where so much of it is hidden.
 ISOHF_KERNEL void share_of_hidden(float* __restrict values, int count) {
   for (int i = 0; i < count; ++i) {
@@ -206,6 +250,9 @@ class PointColumns {
       while (static_cast<std::int64_t>(west_[0].size()) < end) {
         const double x = object_x(static_cast<std::size_t>(tile), west_[0].size());
         const double inside = std::clamp(x, 0.0, 2.0 * cells);
+        from_vertex_.push_back(static_cast<float>(inside - 2.0 * std::floor(inside / 2.0)));
+        per_half_step_[1].push_back(0.5F);
+        per_half_step_[0].push_back(inside < 1.0 || inside >= 2.0 * cells - 1.0 ? 1.0F : 0.5F);
         add(1, 1.0 + inside / 2.0);
         // Column 1 of even rows lies at 0, then come odd half steps, and column C-2 lies on the edge again.
         add(0, inside < 1.0                 ? 1.0 + inside
@@ -235,18 +282,28 @@ class PointColumns {
     return {std::max(points.first, start(tile)), std::min(points.last, start(tile + 1))};
   }
 
-  /// Values of a stored row of tiles_under(points) at these points.
-  void read(const float* values, int row, int stored_columns, const Run& points, float* out) const {
+  /// Values of a stored row of tiles_under(points) at these points, and their slopes per half step; null: not wanted.
+  void read(const float* values, int row, int stored_columns, const Run& points, float* out, float* slopes) const {
     const auto parity = static_cast<std::size_t>(row % 2);
     const Run tiles = tiles_under(points);
     for (std::int64_t tile = tiles.first; tile < tiles.last; ++tile, values += stored_columns) {
       const Run here = of_tile(tile, points);
       const auto first = static_cast<std::size_t>(here.first);
-      vectorised<between_vertices>(values, west_[parity].data() + first, east_[parity].data() + first,
-                                   share_[parity].data() + first, static_cast<int>(here.last - here.first),
-                                   out + (here.first - points.first));
+      const auto count = static_cast<int>(here.last - here.first);
+      const std::int64_t place = here.first - points.first;
+      const std::int32_t* const west = west_[parity].data() + first;
+      const std::int32_t* const east = east_[parity].data() + first;
+      const float* const share = share_[parity].data() + first;
+      if (slopes == nullptr) {
+        vectorised<between_vertices>(values, west, east, share, count, out + place);
+      } else {
+        vectorised<between_vertices_with_slopes>(values, west, east, share, per_half_step_[parity].data() + first,
+                                                 count, out + place, slopes + place);
+      }
     }
   }
+  /// Half steps of points from the nearest vertex of an odd row to the West.
+  [[nodiscard]] const float* from_vertex(const Run& points) const { return from_vertex_.data() + points.first; }
 
  private:
   /// A void beyond a vertex that a point lies on takes nothing from it.
@@ -268,6 +325,8 @@ class PointColumns {
   std::vector<std::int32_t> west_[2];
   std::vector<std::int32_t> east_[2];
   std::vector<float> share_[2];
+  std::vector<float> per_half_step_[2];  ///< 1 over the half steps between both vertices
+  std::vector<float> from_vertex_;
 };
 
 /// A row of the picture before it is shaded: sums over points until its last point is there, means then.
@@ -361,7 +420,14 @@ class ShadeRenderer {
     SweptSun sun = swept_sun(request.sun_azimuth_deg, request.sun_elevation_deg,
                              sun_radius_deg(archive_.metadata().source.body), 1.0, 1.0);
     if (request.softness) sun.softness = *request.softness * world_per_elevation_;
-    sweep_.emplace(scaled(grid_, ground_), scaled(archive_.metadata().valid, ground_), sun);
+    const TileGrid ground = scaled(grid_, ground_);
+    sweep_.emplace(ground, scaled(archive_.metadata().valid, ground_), sun);
+    if (!sun.softness) {
+      const double azimuth = sun.azimuth_deg * std::numbers::pi / 180.0;
+      facet_sun_ = FacetSun{static_cast<float>(std::sin(azimuth) / ground.sigma_x()),
+                            static_cast<float>(-std::cos(azimuth) / ground.sigma_z()), static_cast<float>(sun.fall),
+                            static_cast<float>(1.0 / (sun.upper_fall - sun.lower_fall))};
+    }
     if (!sweep_->from_south()) return;
     // What enters every stride-th row of tiles is kept for all time, and those in between for the rows that are drawn
     // next.
@@ -559,17 +625,40 @@ class ShadeRenderer {
   /// A field of the tiles at rows of points, one after the other.
   class Field {
    public:
-    Field(const PointColumns& columns, const TileRowValues& values, const TileShape& shape, const Run& points)
-        : columns_(columns), values_(values), shape_(shape), points_(points), tiles_(columns.tiles_under(points)) {}
+    enum class Slopes { kUnwanted, kWanted };
+
+    Field(const PointColumns& columns, const TileRowValues& values, const TileShape& shape, const Run& points,
+          Slopes slopes = Slopes::kUnwanted)
+        : columns_(columns),
+          values_(values),
+          shape_(shape),
+          points_(points),
+          tiles_(columns.tiles_under(points)),
+          slopes_(slopes) {}
 
     void read(int row, float share, float* out) {
-      if (row == south_.row) std::swap(north_, south_);
+      if (row == south_.row || row + 1 == north_.row) std::swap(north_, south_);
       keep(row, north_);
       if (share == 0.0F) return static_cast<void>(std::copy(north_.points.begin(), north_.points.end(), out));
       keep(row + 1, south_);
       vectorised<between_rows>(static_cast<const float*>(north_.points.data()),
                                static_cast<const float*>(south_.points.data()), share,
                                static_cast<int>(north_.points.size()), out);
+    }
+
+    /// Hides what the triangles at these points hide of the sun by facing away from it. Needs Slopes::kWanted.
+    /// share  0...1 from stored row `row` to the next
+    void hide_by_own_triangles(int row, float share, FacetSun sun, float* hidden) {
+      if (row == south_.row || row + 1 == north_.row) std::swap(north_, south_);
+      keep(row, north_);
+      keep(row + 1, south_);
+      const bool is_odd = row % 2 != 0;
+      const Row& odd = is_odd ? north_ : south_;
+      const Row& even = is_odd ? south_ : north_;
+      if (!is_odd) sun.across = -sun.across;
+      vectorised<hide_by_facets>(odd.points.data(), even.points.data(), odd.slopes.data(), even.slopes.data(),
+                                 columns_.from_vertex(points_), static_cast<int>(odd.points.size()),
+                                 is_odd ? share : 1.0F - share, sun, hidden);
     }
 
     /// Beside voids the mesh's own triangles say which points have a height: where one row has none.
@@ -591,6 +680,7 @@ class ShadeRenderer {
       std::vector<float> buffer;
       std::span<const float> vertices;  ///< of the tiles
       std::vector<float> points;
+      std::vector<float> slopes;
     };
 
     void keep(int row, Row& kept) const {
@@ -598,7 +688,9 @@ class ShadeRenderer {
       kept.row = row;
       kept.vertices = values_.row(row, tiles_.first, tiles_.last - tiles_.first, kept.buffer);
       kept.points.resize(static_cast<std::size_t>(points_.last - points_.first));
-      columns_.read(kept.vertices.data(), row, shape_.columns(), points_, kept.points.data());
+      if (slopes_ == Slopes::kWanted) kept.slopes.resize(kept.points.size());
+      columns_.read(kept.vertices.data(), row, shape_.columns(), points_, kept.points.data(),
+                    slopes_ == Slopes::kWanted ? kept.slopes.data() : nullptr);
     }
     /// As interpolate() has it.
     [[nodiscard]] double on_triangle(std::int64_t tile, const Barycentric& at) const {
@@ -617,6 +709,7 @@ class ShadeRenderer {
     const TileShape& shape_;
     Run points_;
     Run tiles_;
+    Slopes slopes_;
     Row north_;
     Row south_;
   };
@@ -624,7 +717,7 @@ class ShadeRenderer {
   void draw_points(std::int64_t tile_row, const Run& rows, const Run& block) {
     const TileShape& shape = grid_.shape();
     const Run columns{block.first * x_.per_pixel(), block.last * x_.per_pixel()};
-    Field heights(columns_, *heights_, shape, columns);
+    Field heights(columns_, *heights_, shape, columns, facet_sun_ ? Field::Slopes::kWanted : Field::Slopes::kUnwanted);
     std::optional<Field> hidden;
     if (sweep_) hidden.emplace(columns_, *hidden_, shape, columns);
     TexelRows texels;
@@ -646,12 +739,22 @@ class ShadeRenderer {
       if (has_voids_ && part > 0.0F) heights.mend(place, h);
       if (sweep_) {
         hidden->read(row + 1, part, s);
+        if (facet_sun_) hide_by_own_triangles(heights, tile_row, row + 1, part, s);
         vectorised<share_of_hidden>(s, static_cast<int>(count));
       }
       if (!single) add(height, share, block, pixels);
       if (textures_) add_photo(texels, z / shape.cell_rows(), columns, pixels);
       if ((j + 1) % z_.per_pixel() == 0) finish(pixels, block);
     }
+  }
+
+  /// On a lattice row the triangles towards the sun count.
+  void hide_by_own_triangles(Field& heights, std::int64_t tile_row, int row, float part, float* hidden) const {
+    const bool is_before = part == 0.0F && facet_sun_->across < 0.0F;
+    const int north = is_before ? row - 1 : row;
+    const bool is_in_world =
+        (north > 0 || tile_row > 0) && (north < grid_.shape().rows() - 2 || tile_row + 1 < grid_.tile_rows());
+    if (is_in_world) heights.hide_by_own_triangles(north, is_before ? 1.0F : part, *facet_sun_, hidden);
   }
 
   void add(const std::vector<float>& height, const std::vector<float>& share, const Run& block,
@@ -821,6 +924,7 @@ class ShadeRenderer {
   GroundScale ground_;
   double world_per_elevation_;
   std::optional<ShadowSweep> sweep_;
+  std::optional<FacetSun> facet_sun_;  ///< none where the sun has one softness at all distances
   std::optional<ShadeTexture> textures_;
   ScratchFolder scratch_;
   std::int64_t rows_at_once_ = 1;         ///< of pixels
