@@ -83,6 +83,19 @@ cli::Report report_of(const ViewReport& found, const std::string& archive) {
   report.add("shadow_vertices", found.shadow_vertices);
   report.add("seeded_vertices", found.seeded_vertices);
   report.add("worst_shadow", found.worst_shadow);
+  ordered_json rays = ordered_json::array();
+  for (const ViewReport::RaySun& one : found.ray_suns) {
+    rays.push_back({{"azimuth_deg", one.azimuth_deg},
+                    {"elevation_deg", one.elevation_deg},
+                    {"vertices", one.vertices},
+                    {"dark", one.dark},
+                    {"lit_though_dark", one.lit_though_dark},
+                    {"dark_though_lit", one.dark_though_lit}});
+    report.line("rays", fmt::format("sun at {:g},{:g}: {} of {} vertices dark, {} of these drawn lit, {} others dark",
+                                    one.azimuth_deg, one.elevation_deg, cli::describe_count(one.dark),
+                                    cli::describe_count(one.vertices), one.lit_though_dark, one.dark_though_lit));
+  }
+  report.add("rays", rays);
   report.add("failures", found.failures);
   ordered_json findings = ordered_json::array();
   for (const ViewFinding& one : found.findings) {

@@ -4,8 +4,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <numbers>
 #include <string>
 
+#include "isohf/light/shadow_sweep.h"
 #include "reading/hud.h"
 
 namespace isohf::view {
@@ -65,10 +67,19 @@ Vec3 by_day(Vec3 colour, Vec3 sun) {
   return std::clamp(sun.y * 5.0 + 0.35, 0.08, 1.0) * colour;
 }
 
+/// The part of the sun that a triangle hides by one unit of slope towards it, over the cosine of the sun's elevation.
+double facet_gain(Vec3 sun, const std::string& body) {
+  const double elevation_deg = std::asin(std::clamp(sun.y, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+  if (elevation_deg <= 0.0 || elevation_deg >= 90.0) return 0.0;
+  const SweptSun edges = swept_sun(0.0, elevation_deg, sun_radius_deg(body), 1.0, 1.0);
+  return 1.0 / ((edges.upper_fall - edges.lower_fall) * std::hypot(sun.x, sun.z));
+}
+
 /// The uniforms of light and haze.
-void set_light(const TerrainProgram& program, const ViewState& view, const Air& air) {
+void set_light(const TerrainProgram& program, const ViewState& view, const Air& air, const std::string& body) {
   const Vec3 sun = normalised(view.sun);
   set_vec3(program.uniform("sun"), sun);
+  glUniform1f(program.uniform("facet_gain"), static_cast<float>(facet_gain(sun, body)));
   const double height = std::clamp(sun.y * 2.5, 0.0, 1.0);
   const Vec3 warm = air.reddens ? Vec3{1.0, 0.62 + height * 0.34, 0.36 + height * 0.52} : Vec3{0.95, 0.95, 0.95};
   set_vec3(program.uniform("sun_light"), (sun.y > 0.0 ? 0.95 : 0.0) * warm);
@@ -261,7 +272,8 @@ void Renderer::begin_shading(const Frame& frame, const TerrainProgram& program) 
   const double codes = std::max(whole_.high - whole_.low, 1e-9) / scale.scale;
   glUniform2f(program.uniform("ramp"), static_cast<float>((whole_.low - scale.offset) / scale.scale),
               static_cast<float>(1.0 / codes));
-  set_light(program, view, air_);
+  const Metadata* const metadata = source_.metadata();
+  set_light(program, view, air_, metadata != nullptr ? metadata->source.body : std::string());
 }
 
 void Renderer::place_texture(const TerrainProgram& program, PlaneTile at) const {

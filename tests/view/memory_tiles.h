@@ -44,6 +44,13 @@ class MemoryTiles final : public view::TileSource {
     if (alter_heights_) alter_heights_(tile, heights);
   }
 
+  /// The share of the sun that rays find at every point.
+  void set_share(float share) { share_ = share; }
+  [[nodiscard]] std::vector<float> sun_shares(std::span<const WorldPoint> points, const Sun& sun) const override {
+    if (!share_) return TileSource::sun_shares(points, sun);
+    return std::vector<float>(points.size(), *share_);
+  }
+
   /// On that planet or moon.
   void set_body(const std::string& body) { metadata_.emplace(grid()).source.body = body; }
   [[nodiscard]] const Metadata* metadata() const override { return metadata_ ? &*metadata_ : nullptr; }
@@ -73,6 +80,7 @@ class MemoryTiles final : public view::TileSource {
   std::vector<view::TileBounds> bounds_;
   AlterHeights alter_heights_;
   std::optional<Metadata> metadata_;
+  std::optional<float> share_;
 };
 
 }  // namespace isohf::test

@@ -227,6 +227,24 @@ TEST_F(VerifyViewTest, FindsShadowsOfAnotherGround) {
   expect_shadows_found([](std::span<float> h) { h[h.size() / 2] = 65000.0F; }, "one caster too many");
 }
 
+TEST_F(VerifyViewTest, FindsShadowsThatAreNotThoseOfRays) {
+  MemoryTiles source(tiny_grid());
+  source.set_share(0.0F);
+  const ViewReport report = verify_view(source, make_index_arrays(source.grid().shape()));
+  ASSERT_EQ(report.ray_suns.size(), 2U);
+  for (const ViewReport::RaySun& sun : report.ray_suns) {
+    EXPECT_GT(sun.vertices, 0);
+    EXPECT_EQ(sun.dark, sun.vertices);
+    EXPECT_GT(sun.lit_though_dark, sun.vertices / 4);
+    EXPECT_EQ(sun.dark_though_lit, 0);
+  }
+  ASSERT_EQ(report.findings.size(), 2U) << text_of(report);
+  for (const ViewFinding& finding : report.findings) {
+    EXPECT_EQ(finding.id, finding::kDrawnShadow);
+    EXPECT_NE(finding.where.find("rays find"), std::string::npos);
+  }
+}
+
 TEST_F(VerifyViewTest, FindsOneWrongElevationOnAnEdge) {
   const int columns = tiny_grid().shape().columns();
   expect_tile_found(

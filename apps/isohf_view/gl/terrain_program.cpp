@@ -32,9 +32,10 @@ uniform vec3 anchor;            // the anchor's place, seen from the eye; y: ele
 uniform float code_height;      // world units of one code, exaggeration included
 uniform mat4 clip_from_eye;
 invariant gl_Position;          // all programs put a vertex in the same place
-// Two slots of four: a software rasteriser pays for each slot and triangle.
+// Few slots: a software rasteriser pays for each slot and triangle.
 out vec4 v_facing;              // unit normal, distance from the eye
 out vec4 v_place;               // object space x and z, elevation code, depth in the shadow
+out vec3 v_eye;                 // place seen from the eye
 uniform vec4 covered;           // West, North, East, South of what is shown, seen from the eye
 out float gl_ClipDistance[4];   // only looked at where the renderer asks for it
 centroid out float v_void;       // not beyond the triangle, where a pixel of several samples only touches it
@@ -100,6 +101,7 @@ void main() {
   float height = float(own) * code_height;
   vec3 eye = anchor + vec3(float(lattice.x) * sigma.x, height, float(lattice.y) * sigma.y);
   v_facing = vec4(vertex_normal(v, own), length(eye));
+  v_eye = eye;
   v_place = vec4(vec2(lattice - tile_lattice) / float(stride), float(own), shadow);
   gl_Position = clip_from_eye * vec4(eye, 1.0);
   v_void = own == 65535 ? 1.0 : 0.0;
@@ -121,6 +123,7 @@ centroid in float v_void;
 constexpr const char* kTerrainFragment = R"glsl(
 in vec4 v_facing;
 in vec4 v_place;
+in vec3 v_eye;
 out vec4 colour;
 
 uniform int level;              // of the mesh in hand
@@ -138,6 +141,17 @@ uniform sampler2D palette;      // colours along the ramp, to the power of 1.6
 uniform sampler2D tile_texture; // colours as coded, multiplied by alpha
 uniform vec4 texture_place;     // texture coordinates = object space * xy + zw
 uniform float shadow_gain;      // part of the sun that 1 hides; 0: no shadows
+uniform float facet_gain;       // part of the sun that a triangle hides from itself, by dot(its normal, sun) / normal.y
+
+// The part of the sun that is hidden. At vertices it goes beyond 0 and 1, so that a border lies between two of them
+// (shadow_front.h). A triangle of full detail that faces away is dark up to its sides, whatever its vertices are.
+float hidden_part() {
+  float by_vertices = v_place.w * shadow_gain;
+  if (level > 0) return by_vertices;
+  vec3 facing = cross(dFdx(v_eye), dFdy(v_eye));
+  float by_itself = facing.y != 0.0 ? 0.5 - facet_gain * dot(facing, sun) / facing.y : 0.0;
+  return max(by_vertices, by_itself);
+}
 
 #if MODE == 0 || MODE == 3
 vec3 hypsometric() { return texture(palette, vec2((v_place.z - ramp.x) * ramp.y, 0.5)).rgb; }
@@ -183,8 +197,8 @@ void main() {
   vec3 shown = normal * 0.5 + 0.5;
 #else
   vec3 base = base_colour();
-  // What is hidden goes beyond 0 and 1, so that a border lies between two vertices (shadow_front.h).
-  float direct = max(dot(normal, sun), 0.0) * clamp(1.0 - v_place.w * shadow_gain, 0.0, 1.0);
+  float direct = max(dot(normal, sun), 0.0);
+  if (shadow_gain > 0.0) direct *= clamp(1.0 - hidden_part(), 0.0, 1.0);
   vec3 shown = base * (sky_light * (0.5 + 0.5 * normal.y) + sun_light * direct);
 #endif
   float far = clamp((v_facing.w - haze.x) * haze.y, 0.0, 1.0);

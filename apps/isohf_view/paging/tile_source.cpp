@@ -100,6 +100,16 @@ class ArchiveSource final : public TileSource {
     return casters;
   }
 
+  [[nodiscard]] std::vector<float> sun_shares(std::span<const WorldPoint> points, const Sun& sun) const override {
+    std::vector<WorldPoint> places;
+    for (const WorldPoint point : points) places.push_back(to_archive(point));
+    std::vector<SunSample> samples(places.size());
+    Surface(reader_).sample(places, sun, 0.0, std::span(samples));
+    std::vector<float> shares;
+    for (const SunSample& sample : samples) shares.push_back(static_cast<float>(sample.share));
+    return shares;
+  }
+
  private:
   /// A coarse plane of the archive.
   class Coarse final : public TileSource {
@@ -222,6 +232,10 @@ Place TileSource::describe(WorldPoint at, double height) const {
 
 WorldPoint TileSource::from_archive(WorldPoint at) const {
   return {at.x * facts_.ground_scale.x, at.z * facts_.ground_scale.z};
+}
+
+std::vector<float> TileSource::sun_shares(std::span<const WorldPoint>, const Sun&) const {
+  return {};
 }
 
 WorldPoint TileSource::to_archive(WorldPoint at) const {

@@ -19,6 +19,7 @@
 #include "isohf/picture.h"
 #include "isohf/restore/ground_scale.h"
 #include "isohf/shade.h"
+#include "isohf/surface.h"
 #include "isohf/tile_range.h"
 #include "view_state.h"
 
@@ -87,6 +88,9 @@ class TileSource {
   virtual void read_heights(TileIndex tile, std::span<float> heights) const;
   /// The casters of a tile's seeds, their heights like those that read_heights gives, which it gives as well.
   virtual CasterRows read_casters(TileIndex tile, LightTravel travel, std::span<float> heights) const;
+  /// The share of the sun at points of the surface, 0 to 1, found by a ray from each; NaN if there is no surface. Empty if
+  /// the source has no archive.
+  [[nodiscard]] virtual std::vector<float> sun_shares(std::span<const WorldPoint> points, const Sun& sun) const;
   /// All names of a place of that height, world units.
   [[nodiscard]] virtual Place describe(WorldPoint at, double height) const;
   /// nullptr where there is no archive.

@@ -42,7 +42,17 @@ struct ViewReport {
   std::int64_t seeded_vertices = 0;  ///< of them, drawn from shadow seeds
   std::vector<double> suns_deg;      ///< that shadows were looked at for, from either side
   double worst_shadow = 0.0;         ///< part of the sun that is hidden
-  double worst_height = 0.0;         ///< codes, within tolerance or not
+  /// A sun whose shadows were compared with rays from a sample of the vertices. Lit is a share of 1/2 or more.
+  struct RaySun {
+    double azimuth_deg = 0.0;
+    double elevation_deg = 0.0;
+    std::int64_t vertices = 0;
+    std::int64_t dark = 0;             ///< by rays
+    std::int64_t lit_though_dark = 0;  ///< drawn lit, dark by rays
+    std::int64_t dark_though_lit = 0;
+  };
+  std::vector<RaySun> ray_suns;
+  double worst_height = 0.0;  ///< codes, within tolerance or not
   double worst_normal = 0.0;
   std::int64_t failures = 0;          ///< findings in all
   std::vector<ViewFinding> findings;  ///< at most kMaxFindings, the first ones
@@ -91,7 +101,8 @@ void verify_tiles(const CheckContext& context);
 
 /// Checks the shadows that pictures are drawn with: for some suns in the East and West, light is swept over each whole
 /// row of tiles (paper section 3.13), and compared with what the shaders make of each tile's own: from the archive's
-/// seeds if it has them.
+/// seeds if it has them. If the source has an archive, also compares shadows of two suns that stand elsewhere with rays
+/// from a sample of the vertices.
 void verify_shadows(const CheckContext& context);
 
 // Why tolerances are what they are: codes and unit normals pass through 32-bit interpolation, whose planes are told

@@ -49,7 +49,7 @@ const std::vector<FindingKind>& finding_catalogue() {
       {finding::kDrawnMesh, Severity::kError,
        "triangles of the index arrays do not join side to side, or do not meet the full-detail border"},
       {finding::kDrawnShadow, Severity::kError,
-       "a vertex's drawn shadow is not that of light swept over its row of tiles"},
+       "a vertex's drawn shadow is not that of light swept over its row of tiles, or too many are not those of rays"},
       {finding::kPlane, Severity::kError,
        "a coarse plane's tile is missing, or does not hold the elevations of the tiles below it"},
       {finding::kPlaneRange, Severity::kError,
