@@ -166,6 +166,7 @@ class UnchangedSource final : public HeightSource {
     require_unchanged(info_.path, stamp_);
     check_elevations(samples);
   }
+  [[nodiscard]] bool is_gap(const Window& window) const override { return source_->is_gap(window); }
   [[nodiscard]] std::uint64_t buffer_bytes() const override { return source_->buffer_bytes(); }
 
  private:
@@ -264,6 +265,7 @@ class PlacedSource final : public HeightSource {
   void read_window(const Window& window, std::span<std::byte> samples) override {
     source_->read_window(window, samples);
   }
+  [[nodiscard]] bool is_gap(const Window& window) const override { return source_->is_gap(window); }
   [[nodiscard]] std::uint64_t buffer_bytes() const override { return source_->buffer_bytes(); }
 
  private:

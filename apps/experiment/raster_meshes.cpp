@@ -14,7 +14,7 @@
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/sampling/resample/prefilter.h"
 #include "isohf/sampling/resample/row_sampler.h"
-#include "isohf/sampling/source/band_reader.h"
+#include "isohf/sampling/source/height_rows.h"
 
 namespace isohf::experiment {
 namespace {
@@ -96,11 +96,12 @@ class Study {
         record_(surface_.source),
         datum_(choose_datum({surface_.statistics.min.value_or(0.0), surface_.statistics.max.value_or(0.0)})),
         kernel_(Kernel::make(known(surface_.filter, "filter"), known(surface_.edges, "edges"))) {
-    const RowRange all{0, record_.height - 1};
+    const Window all{0, 0, record_.width, record_.height};
     const Prefilter as_they_are = Prefilter::make(Filter::kBilinear, {});
     const Prefilter prefilter = Prefilter::make(kernel_.filter(), known(surface_.acquisition, "acquisition"));
-    samples_ = BandReader(source, datum_, as_they_are).read(all);
-    coefficients_ = prefilter.is_identity() ? samples_ : BandReader(source, datum_, prefilter).read(all);
+    HeightRows rows(source, datum_, false, CellStore::of_rows(source.info(), std::uint64_t{8} << 20U));
+    (void)rows.read(all, as_they_are, samples_);
+    (void)rows.read(all, prefilter, coefficients_);
   }
 
   [[nodiscard]] Squares measure(const Mesh& mesh) const {
@@ -145,7 +146,7 @@ class Study {
     RowSampler::Scratch scratch;
     std::vector<float> heights(static_cast<std::size_t>(laid.columns));
     for (std::size_t row = 0; row < laid.rows.size(); ++row) {
-      sampler.sample(coefficients_->view(), laid.first_z + static_cast<double>(row) * mesh.spacing_z, taps[row % 2],
+      sampler.sample(coefficients_.view(), laid.first_z + static_cast<double>(row) * mesh.spacing_z, taps[row % 2],
                      scratch, heights);
       TileCodes codes;
       (void)quantise(surface_.quantisation, limits, datum_, heights, codes);
@@ -179,7 +180,7 @@ class Study {
       const bool is_odd = row % 2 != 0;
       const double slide = mesh.is_iso ? 0.5 * (is_odd ? 1.0 - v : v) : 0.0;
       for (std::int64_t c = 0; c < record_.width; ++c) {
-        const float sample = samples_->view().heights(c, r);
+        const float sample = samples_.view().heights(c, r);
         if (std::isnan(sample)) continue;
         const double world_x = record_.first_sample_x + static_cast<double>(c) * record_.spacing_x;
         const auto [column, u] = place((world_x - laid.first_x) / mesh.spacing_x - slide, laid.columns);
@@ -204,8 +205,8 @@ class Study {
   const SourceRecord& record_;
   double datum_;
   Kernel kernel_;
-  std::shared_ptr<const Band> samples_;
-  std::shared_ptr<const Band> coefficients_;
+  Band samples_;
+  Band coefficients_;
 };
 
 SquareErrors errors_of(const Squares& squares) {

@@ -17,6 +17,9 @@ class WindowedSource : public HeightSource {
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
   void read_window(const Window& window, std::span<std::byte> samples) override;
+  [[nodiscard]] bool is_gap(const Window& window) const override {
+    return source_.is_gap({window_.column + window.column, window_.row + window.row, window.columns, window.rows});
+  }
   [[nodiscard]] std::uint64_t buffer_bytes() const override { return source_.buffer_bytes(); }
   /// The same window of what the other source is made of.
   [[nodiscard]] HeightSource& as_stored() override { return stored_ ? *stored_ : *this; }

@@ -329,6 +329,17 @@ void MosaicSource::compose(const Window& window, std::span<std::byte> out) {
   }
 }
 
+bool MosaicSource::is_gap(const Window& window) const {
+  for (std::size_t layer = 0; layer < plan_.layers.size(); ++layer) {
+    const MosaicLayer& members = plan_.layers[layer];
+    if (members.way) return false;  // where they lie takes its time
+    const Window needed =
+        plan_.is_on_grid(members) ? window : LayerPlaces(members, plan_.info.georeference, window).needed();
+    if (needed.columns > 0 && needed.rows > 0 && !parts_in(layer, needed).empty()) return false;
+  }
+  return true;
+}
+
 std::vector<MosaicSource::Part> MosaicSource::parts_in(std::size_t layer, const Window& window) const {
   const MosaicLayer& members = plan_.layers[layer];
   std::vector<Part> parts;

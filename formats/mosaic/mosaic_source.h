@@ -32,6 +32,7 @@ class MosaicSource final : public HeightSource {
 
   [[nodiscard]] const SourceInfo& info() const override { return plan_.info; }
   void read_window(const Window& window, std::span<std::byte> samples) override;
+  [[nodiscard]] bool is_gap(const Window& window) const override;
   [[nodiscard]] std::uint64_t buffer_bytes() const override;
 
   [[nodiscard]] const MosaicPlan& plan() const { return plan_; }

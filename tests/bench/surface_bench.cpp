@@ -54,7 +54,7 @@ struct Stages {
     info.height = kRows;
     info.sample_type = SampleType::kInt16;
     heights_from_samples(info, 0.0, raw, heights);
-    cutter(Filter::kBilinear)->cut({0, 0}, band(), tile);
+    cutter(Filter::kBilinear)->cut_from(band(), {0, 0}, tile);
     quantise(quantisation, 0.0, tile, codes);
   }
 
@@ -140,7 +140,7 @@ void cut_tile(benchmark::State& state) {
   const auto cutter = stages().cutter(kFilters[state.range(0)]);
   std::vector<float> out(stages().tile.size());
   for (auto _ : state) {
-    cutter->cut({0, 0}, stages().band(), out);
+    cutter->cut_from(stages().band(), {0, 0}, out);
     benchmark::DoNotOptimize(out.data());
     benchmark::ClobberMemory();
   }

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "isohf/sampling/source/source_rows.h"
+#include "isohf/sampling/source/read_step.h"
 #include "support/rasters/memory_source.h"
 
 namespace isohf {

@@ -43,14 +43,22 @@ struct Fixture {
   [[nodiscard]] std::unique_ptr<TileResampler> cutter(const TileGrid& grid, Filter filter, Outside outside) const {
     return make_grid_resampler(grid, {axis(width, outside), axis(height, outside)}, Kernel::make(filter), {-1e9, 1e9});
   }
-  /// Cuts with a band of just the rows that the cutter asks for.
+  /// Cuts with a band of just the samples that the cutter asks for.
   [[nodiscard]] std::vector<float> cut(const TileGrid& grid, TileIndex tile, Filter filter = Filter::kBilinear,
                                        Outside outside = Outside::kClamp) const {
     const auto cutter_ = cutter(grid, filter, outside);
     const RowRange rows = cutter_->rows_needed(tile.row);
-    const SourceBand band{{heights.data() + rows.first * width, width, rows.last - rows.first + 1}, rows.first};
+    std::vector<float> band;
+    const auto read = [&](const Window& window) -> std::optional<SourceBand> {
+      EXPECT_TRUE(window.row == rows.first && window.rows == rows.last - rows.first + 1);
+      for (std::int64_t r = window.row; r < window.row + window.rows; ++r) {
+        const auto first = heights.begin() + r * width + window.column;
+        band.insert(band.end(), first, first + window.columns);
+      }
+      return SourceBand{{band.data(), window.columns, window.rows}, window.row, {}, window.column};
+    };
     std::vector<float> out(static_cast<std::size_t>(grid.shape().stored_vertex_count()));
-    cutter_->cut(tile, band, out);
+    EXPECT_TRUE(cutter_->cut(tile, read, out));
     return out;
   }
 };

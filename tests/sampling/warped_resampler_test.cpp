@@ -50,16 +50,29 @@ struct Fixture {
     }
   }
 
-  /// Cuts with a band of just the rows that the cutter asks for.
+  /// Cuts with a band of just the samples that the cutter asks for.
   [[nodiscard]] std::vector<float> cut(TileIndex tile, Filter filter, Outside outside) const {
     SourceGeometry with = geometry;
     with.outside = outside;
     const auto cutter = make_tile_resampler(grid, with, Kernel::make(filter), {-1e9, 1e9});
     const RowRange rows = cutter->rows_needed(tile.row);
-    const std::vector<float> band(heights.begin() + rows.first * with.width,
-                                  heights.begin() + (rows.last + 1) * with.width);
-    std::vector<float> out(static_cast<std::size_t>(grid.shape().stored_vertex_count()));
-    cutter->cut(tile, {{band.data(), with.width, rows.last - rows.first + 1}, rows.first}, out);
+    const std::optional<Window> about = cutter->window_about(tile);
+    std::vector<float> band;
+    const auto read = [&](const Window& window) -> std::optional<SourceBand> {
+      EXPECT_TRUE(window.row >= rows.first && window.row + window.rows <= rows.last + 1);
+      if (about) {
+        EXPECT_TRUE(window.column >= about->column && window.row >= about->row);
+        EXPECT_LE(window.column + window.columns, about->column + about->columns);
+        EXPECT_LE(window.row + window.rows, about->row + about->rows);
+      }
+      for (std::int64_t r = window.row; r < window.row + window.rows; ++r) {
+        const auto first = heights.begin() + r * with.width + window.column;
+        band.insert(band.end(), first, first + window.columns);
+      }
+      return SourceBand{{band.data(), window.columns, window.rows}, window.row, {}, window.column};
+    };
+    std::vector<float> out(static_cast<std::size_t>(grid.shape().stored_vertex_count()), NAN);
+    (void)cutter->cut(tile, read, out);
     return out;
   }
 

@@ -144,7 +144,7 @@ Report report_of(const SourceInfo& info, const Plan& plan, const MemoryPlan& mem
              fmt::format("about {} while converting{}; --memory can be as small as {}", describe_bytes(memory.bytes),
                          memory.scratch_bytes == 0
                              ? ""
-                             : fmt::format(", and {} of a scratch file", describe_bytes(memory.scratch_bytes)),
+                             : fmt::format(", and up to {} of a temporary file", describe_bytes(memory.scratch_bytes)),
                          describe_bytes(memory.least_bytes)));
   report.add("least_memory_bytes", memory.least_bytes);
   report.add("scratch_bytes", memory.scratch_bytes);
@@ -187,7 +187,7 @@ int preview(ConvertCommandOptions& options) {
     all.emplace_back(std::move(scale));
   ErrorEstimate error;
   try {
-    check_memory(source, plan, how, memory, job);
+    check_memory(source, memory, job);
     error = estimate_error(source, how, job);
   } catch (const Error& refusal) {
     if (refusal.code() != ErrorCode::kOutOfMemory || job.memory_bytes != 0) throw;  // a bound that was given

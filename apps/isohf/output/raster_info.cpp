@@ -8,7 +8,7 @@
 #include "formats/io/foreign_file.h"
 #include "isohf/error.h"
 #include "isohf/projection/crs/source_system.h"
-#include "isohf/sampling/source/source_rows.h"
+#include "isohf/sampling/source/read_step.h"
 #include "options/describe.h"
 #include "output/standard_output.h"
 

@@ -132,6 +132,10 @@ class HeightSource {
   /// Throws Error{kIo, kCorrupt}: a sample is either delivered as stored or reported, never made up.
   virtual void read_window(const Window& window, std::span<std::byte> samples) = 0;
 
+  /// Whether no sample of the window has an elevation, as far as that is known without reading it: between the files of a
+  /// mosaic. Any thread.
+  [[nodiscard]] virtual bool is_gap(const Window& /*window*/) const { return false; }
+
   /// Bytes that are kept at most from one call to the next, for decoded samples above all: within
   /// OpenOptions::buffer_bytes unless the source cannot do with so few; 0: none to speak of.
   [[nodiscard]] virtual std::uint64_t buffer_bytes() const { return 0; }

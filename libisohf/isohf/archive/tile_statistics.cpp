@@ -122,6 +122,16 @@ TileStatistics tile_statistics(const CountedVertices& counted, TileIndex index, 
   return statistics;
 }
 
+TileStatistics void_statistics(const CountedVertices& counted, TileIndex index) {
+  TileStatistics statistics;
+  for (int r = 1; r <= counted.shape().rows() - 2; ++r) {
+    const auto [first, last] = counted.of_row(index, r);
+    statistics.vertices += std::max(last - first + 1, 0);
+  }
+  statistics.voids = statistics.vertices;
+  return statistics;
+}
+
 Statistics total_statistics(const TileStatistics& all) {
   Statistics statistics;
   statistics.vertices = all.vertices;

@@ -39,6 +39,9 @@ class CountedVertices {
 [[nodiscard]] TileStatistics tile_statistics(const CountedVertices& counted, TileIndex index, const TileCodes& tile,
                                              const Quantisation& quantisation);
 
+/// The same of a tile without elevations.
+[[nodiscard]] TileStatistics void_statistics(const CountedVertices& counted, TileIndex index);
+
 /// All tiles' statistics as the metadata has them.
 [[nodiscard]] Statistics total_statistics(const TileStatistics& all);
 

@@ -258,18 +258,21 @@ Sums Windows::errors_in(HeldWindow& window, const Plan& plan, const Reconstructi
     columns = {std::max<std::int64_t>(columns.first, 0), std::min(columns.last, info_.width - 1)};
   }
   const auto cutter = make_tile_resampler(tile, geometry, by.kernel, {-HUGE_VAL, HUGE_VAL});
-  if (!geometry.warp) columns = cutter->columns_needed(0);
+  if (!geometry.warp) {
+    const Window about = *cutter->window_about({0, 0});
+    columns = {about.column, about.column + about.columns - 1};
+  }
   const RowRange rows = cutter->rows_needed(0);
   const bool is_held = columns.first >= held.column && columns.last < held.column + held.columns &&
                        rows.first >= held.row && rows.last < held.row + held.rows;
   if (!is_held) return {};  // across the seam of a joined source, or where the map is too far from square
   std::vector<float> heights(static_cast<std::size_t>(shape.stored_vertex_count()));
-  cutter->cut({0, 0}, band_of(window, by), heights);
+  cutter->cut_from(band_of(window, by), {0, 0}, heights);
   std::vector<float> smooth;
   if (storing.most_off > 0.0) {
     smooth.resize(heights.size());
     window.filter.reset();  // the coefficients are others'
-    cutter->cut({0, 0}, band_of(window, {by.kernel, Prefilter::smoothing()}), smooth);
+    cutter->cut_from(band_of(window, {by.kernel, Prefilter::smoothing()}), {0, 0}, smooth);
     window.filter.reset();
   }
   store(storing, smooth, heights);

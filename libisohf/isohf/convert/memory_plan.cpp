@@ -12,14 +12,13 @@
 #include "isohf/base/arena.h"
 #include "isohf/base/memory/memory_budget.h"
 #include "isohf/base/text/number_text.h"
-#include "isohf/convert/stages/residual_stage.h"
 #include "isohf/convert/stages/seed_stage.h"
 #include "isohf/convert/stages/texture_stage.h"
 #include "isohf/error.h"
 #include "isohf/projection/crs/crs.h"
+#include "isohf/restore/lossless.h"
 #include "isohf/sampling/resample/kernels.h"
 #include "isohf/sampling/resample/prefilter.h"
-#include "isohf/sampling/source/band_reader.h"
 
 namespace isohf {
 namespace {
@@ -48,9 +47,44 @@ constexpr std::array<Ration, 7> kRations = {{{8 * kMiB, 16, 8},
                                              {kMiB / 2, 2, 1},
                                              {kMiB / 4, 2, 1}}};
 constexpr std::uint64_t kLeastReads = 8;
+/// Of the source's rows: with more, and where a map bends them, windows are kept instead.
+constexpr double kMostRowsBytes = 512.0 * kMiB;
+constexpr std::uint64_t kWindowsBytes = 256 * kMiB;
+constexpr std::uint64_t kLeastWindowsBytes = 2 * kMiB;
 /// Where nobody limits it.
 constexpr std::size_t kUnlimitedRation = 1;
 constexpr int kTexturedTilesPerThread = 2;
+
+/// What a ResidualStage holds from its beginning on.
+std::uint64_t kept_residual_bytes(const SourceInfo& info, const Plan& plan, bool in_scratch) {
+  return plan.frame.warp ? 0 : SplinePredictor::kept_bytes(info.width, in_scratch);
+}
+
+/// What its finish() holds at most.
+std::uint64_t residual_bytes(const SourceInfo& info, const Plan& plan, int threads, std::size_t members_at_once,
+                             bool in_scratch) {
+  const TileShape& shape = plan.grid.shape();
+  const auto width = static_cast<double>(info.width);
+  const auto rows = static_cast<double>(std::min(rows_per_residual_member(info), info.height));
+  const auto sample = static_cast<double>(size_bytes(info.sample_type));
+  // Raw samples, predictions and what they deflate to; in each thread also voids, streams and payload.
+  const double members =
+      std::min(static_cast<double>(members_at_once), std::ceil(static_cast<double>(info.height) / rows));
+  const double bands = members * rows * width * (2.0 * sample + 8.0);
+  const double encoding = std::min<double>(threads, members) * rows * width * (1.0 + 5.0 * sample);
+  if (plan.frame.warp) {
+    // A position for each sample of a member, tiles that are kept, and one in each thread.
+    const double tile_bytes = 8.0 * static_cast<double>(shape.stored_vertex_count());
+    const double mesh = 16.0 * static_cast<double>(PlaceMesh::value_count(info.width, info.height));
+    return static_cast<std::uint64_t>(bands + encoding + rows * width * 16.0 + mesh + threads * 2.0 * tile_bytes +
+                                      static_cast<double>(SamplePredictor::kTileBytes));
+  }
+  const double lattice_rows = rows * plan.frame.spacing_z / plan.grid.sigma_z();
+  return static_cast<std::uint64_t>(
+             bands + std::max(encoding, SplinePredictor::lines_bytes(plan.grid, threads, in_scratch)) +
+             SplinePredictor::rows_bytes(plan.grid, info.width, lattice_rows, threads, in_scratch)) +
+         kept_residual_bytes(info, plan, in_scratch);
+}
 
 class Estimate {
  public:
@@ -63,37 +97,43 @@ class Estimate {
         options_(options),
         texture_bytes_(texture_bytes),
         limit_(limit),
-        prefilter_(prefilter),
+        scratch_folder_(job.scratch_folder),
         threads_(threads_of(job)) {
     const TileGrid& grid = plan.grid;
-    // Source rows and columns of a tile with its padding and the taps around it.
+    // Source rows and columns of a tile with its padding and the taps around it; of one that a map turns either way.
     const int taps = Kernel::make(options.filter.value_or(kDefaultFilter)).taps();
-    tile_rows_ = std::min(rounded(plan.band_rows) + taps + 2, info_.height);
-    tile_columns_ =
-        std::min(rounded(grid.shape().columns() * 2.0 * grid.sigma_x() / plan.frame.spacing_x) + taps + 2, info_.width);
-    reads_whole_rows_ = plan.frame.warp || plan.frame.wraps_x;
-    has_bands_ = !prefilter.is_identity() || plan.frame.warp;
-    if (chooses_codes(options)) smoothing_ = Prefilter::smoothing();
+    double rows = grid.shape().rows() * grid.sigma_z() / plan.frame.spacing_z;
+    double columns = grid.shape().columns() * 2.0 * grid.sigma_x() / plan.frame.spacing_x;
+    if (plan.frame.warp) rows = columns = std::hypot(rows, columns);
+    tile_rows_ = std::min(rounded(rows) + taps + 2, info_.height);
+    tile_columns_ = std::min(rounded(columns) + taps + 2, info_.width);
+    halo_ = prefilter.halo();
+    if (chooses_codes(options)) halo_ = std::max<std::int64_t>(halo_, Prefilter::smoothing().halo());
   }
 
-  [[nodiscard]] MemoryPlan with(const Ration& ration, bool in_scratch) const {
-    const TileGrid& grid = plan_.grid;
+  /// Whether rows of the source are too many to be kept whole.
+  [[nodiscard]] bool needs_windows() const {
+    return plan_.frame.warp || rows_bytes(with(kRations[kUnlimitedRation], false)) > kMostRowsBytes;
+  }
+
+  [[nodiscard]] MemoryPlan with(const Ration& ration, bool in_windows) const {
     MemoryPlan memory;
     // Several reads of even a small raster: what follows begins with the first of them.
     const std::uint64_t part = row_bytes() * static_cast<std::uint64_t>(info_.height) / kLeastReads;
-    memory.scan_step = memory.read_step =
-        ReadStep::make(info_, std::min(ration.read_bytes, std::max(part, row_bytes())));
+    const std::uint64_t read_bytes = std::min(ration.read_bytes, std::max(part, row_bytes()));
+    memory.scan_step = ReadStep::make(info_, read_bytes);
     memory.tiles_in_flight =
         static_cast<std::size_t>(threads_ * (options_.texture ? kTexturedTilesPerThread : ration.tiles_per_thread));
     memory.members_at_once = ration.members_at_once;
-    memory.tile_columns_at_once = grid.tile_columns();
-    if (in_scratch) {
-      std::int64_t in_use = prefilter_.is_identity() ? parts_in_flight(memory, grid.tile_columns()) * tile_rows_
-                                                     : tile_rows_ + 2 * prefilter_.halo();
-      if (smoothing_) in_use = std::max(in_use, tile_rows_ + 2 * smoothing_->halo());
-      memory.scratch_rows = std::min(SourceRows::kept_rows_for(memory.read_step, in_use), info_.height);
-      memory.scratch_bytes = static_cast<std::uint64_t>(memory.scratch_rows) * row_bytes() * (smoothing_ ? 2 : 1);
-      if ((has_bands_ || smoothing_) && !reads_whole_rows_) choose_columns(memory);
+    memory.rows = CellStore::of_rows(info_, read_bytes);
+    if (in_windows) {
+      memory.rows = CellStore::of_windows(info_, kLeastWindowsBytes, scratch_folder_);
+      const std::uint64_t least = total(memory);
+      const std::uint64_t more = limit_ == 0 ? kWindowsBytes : limit_ - std::min(limit_, least);
+      memory.rows = CellStore::of_windows(info_, std::min(kLeastWindowsBytes + more, kWindowsBytes), scratch_folder_);
+      const std::int64_t rows = plan_.frame.warp ? info_.height : rows_in_use(memory);
+      const std::uint64_t alive = static_cast<std::uint64_t>(rows) * row_bytes();
+      if (alive > memory.rows.most_bytes) memory.scratch_bytes = alive;
     }
     memory.bytes = total(memory);
     // Where it helps: buffers for a file take as much as a few tiles.
@@ -115,20 +155,13 @@ class Estimate {
     return static_cast<std::uint64_t>(info_.width) * size_bytes(info_.sample_type);
   }
 
-  /// Groups of `tiles` tiles that are in hand at once: the last tile of one may still be waited for while all tiles in
-  /// flight behind it have entered.
-  [[nodiscard]] static std::int64_t parts_in_flight(const MemoryPlan& memory, std::int64_t tiles) {
-    return (static_cast<std::int64_t>(memory.tiles_in_flight) + tiles - 2) / tiles + 1;
-  }
-
-  /// As many tiles as may be prefiltered together within the limit.
-  void choose_columns(MemoryPlan& memory) const {
-    std::int64_t fits = 1;
-    for (std::int64_t beyond = plan_.grid.tile_columns() + 1; beyond - fits > 1;) {
-      memory.tile_columns_at_once = (fits + beyond) / 2;
-      (total(memory) <= limit_ ? fits : beyond) = memory.tile_columns_at_once;
-    }
-    memory.tile_columns_at_once = fits;
+  /// Rows of the source that the tiles in flight read, where its rows are rows of tiles: the last tile of one row may
+  /// still be waited for while all tiles in flight behind it have entered.
+  [[nodiscard]] std::int64_t rows_in_use(const MemoryPlan& memory) const {
+    const std::int64_t tiles = plan_.grid.tile_columns();
+    const std::int64_t tile_rows = (static_cast<std::int64_t>(memory.tiles_in_flight) + tiles - 2) / tiles + 1;
+    const std::int64_t step = memory.rows.step.rows;
+    return std::min(tile_rows * (tile_rows_ + 2 * halo_) + 2 * step, (info_.height + step - 1) / step * step);
   }
 
   [[nodiscard]] std::uint64_t map_bytes() const {
@@ -147,14 +180,13 @@ class Estimate {
         options_.shadow_seeds ? static_cast<double>(SeedRow::memory_bytes(plan_.grid, memory.seeds_in_scratch)) : 0.0;
     const auto waiting =
         std::min(static_cast<double>(memory.tiles_in_flight), static_cast<double>(plan_.grid.tile_count()));
-    const double tiles = waiting * vertices * kWaitingBytesPerVertex + source_pass(memory, prefilter_, has_bands_) +
-                         (smoothing_ ? source_pass(memory, *smoothing_, true) : 0.0) + seeds +
+    const double tiles = waiting * vertices * kWaitingBytesPerVertex + rows_bytes(memory) + window_bytes() + seeds +
                          static_cast<double>(plane_bytes(memory)) + static_cast<double>(texture_bytes_);
     double peak = std::max(scan_pass(memory), tiles);
     if (options_.lossless) {
-      peak += static_cast<double>(residual_stage_kept_bytes(info_, plan_, memory.residuals_in_scratch));
-      peak = std::max(peak, static_cast<double>(residual_stage_memory_bytes(
-                                info_, plan_, threads_, memory.members_at_once, memory.residuals_in_scratch)));
+      peak += static_cast<double>(kept_residual_bytes(info_, plan_, memory.residuals_in_scratch));
+      peak = std::max(peak, static_cast<double>(residual_bytes(info_, plan_, threads_, memory.members_at_once,
+                                                               memory.residuals_in_scratch)));
     }
     return static_cast<std::uint64_t>(program + peak);
   }
@@ -172,35 +204,29 @@ class Estimate {
            edge_rows * sizeof(float) * static_cast<double>(info_.width);
   }
 
-  /// The source's rows, and what tiles are cut from.
-  [[nodiscard]] double source_pass(const MemoryPlan& memory, const Prefilter& prefilter, bool has_bands) const {
-    double bytes = 0.0;
-    const std::int64_t step = memory.read_step.rows;
-    // Slabs that hold the rows of two rows of tiles, wherever they begin; the prefilter copies what it needs at once.
-    const std::int64_t in_use = prefilter.is_identity()
-                                    ? parts_in_flight(memory, plan_.grid.tile_columns()) * tile_rows_
-                                    : std::min(tile_rows_, step);
-    const std::int64_t slabs = std::min((in_use + step - 2) / step + 1, (info_.height + step - 1) / step);
-    const bool in_parts = memory.read_step.columns < info_.width;
-    if (memory.scratch_rows == 0) {
-      bytes += static_cast<double>(slabs * step) * static_cast<double>(row_bytes());
-      if (in_parts) bytes += static_cast<double>(memory.read_step.most_bytes(info_));
-    } else {
-      bytes += static_cast<double>(memory.read_step.most_bytes(info_));
-    }
-    if (!has_bands) {
-      return bytes + threads_ * static_cast<double>(tile_rows_) * static_cast<double>(tile_columns_) * sizeof(float);
-    }
-    const double columns = std::min(static_cast<double>(info_.width), static_cast<double>(memory.tile_columns_at_once) *
-                                                                          static_cast<double>(tile_columns_));
-    // Strips of columns that the threads filter, doubles.
-    const double strips = threads_ * 64.0 * 12.0 * static_cast<double>(tile_rows_ + 2 * prefilter.halo());
-    // Pieces of changing sizes leave gaps in the heap, in that of every thread (measured).
-    const double gaps = memory.scratch_rows > 0 ? 1.0 + 0.2 * threads_ : 1.0;
-    const std::uint64_t bands =
-        BandReader::memory_bytes(prefilter, parts_in_flight(memory, memory.tile_columns_at_once), tile_rows_,
-                                 static_cast<std::int64_t>(columns), info_);
-    return bytes + strips + gaps * static_cast<double>(bands);
+  /// What is kept of the source.
+  [[nodiscard]] double rows_bytes(const MemoryPlan& memory) const {
+    const CellStore& rows = memory.rows;
+    if (rows.most_bytes == UINT64_MAX)
+      return static_cast<double>(rows_in_use(memory)) * static_cast<double>(row_bytes());
+    // Tiles in flight hold cells that cannot go; those beside each other the same ones. The next read comes on top.
+    const auto in_flight = static_cast<std::int64_t>(memory.tiles_in_flight);
+    const std::int64_t columns = std::min(in_flight * tile_columns_ + 2 * rows.cell_columns, info_.width);
+    const std::int64_t held = std::min(rows_in_use(memory), in_flight * (tile_rows_ + 2 * halo_ + 2 * rows.step.rows));
+    const double pinned = static_cast<double>(columns * held) * static_cast<double>(size_bytes(info_.sample_type));
+    const double all = static_cast<double>(info_.height) * static_cast<double>(row_bytes());
+    return std::min(std::max(pinned, static_cast<double>(rows.most_bytes)), all) +
+           2.0 * static_cast<double>(rows.step.most_bytes(info_));
+  }
+
+  /// What tiles are cut from: heights, coefficients and voids, in each thread; one of a joined globe may have whole rows.
+  [[nodiscard]] double window_bytes() const {
+    const double columns = static_cast<double>(std::min(tile_columns_ + 2 * halo_, info_.width));
+    const double samples = static_cast<double>(tile_rows_ + 2 * halo_) *
+                           (threads_ * columns +
+                            (plan_.frame.wraps_x || plan_.frame.samples_wrap ? static_cast<double>(info_.width) : 0.0));
+    const double strips = halo_ == 0 ? 0.0 : threads_ * 64.0 * 12.0 * static_cast<double>(tile_rows_ + 2 * halo_);
+    return strips + samples * (halo_ == 0 ? sizeof(float) : 2.0 * sizeof(float) + 2.0);
   }
 
   const HeightSource& source_;
@@ -209,13 +235,11 @@ class Estimate {
   const ConvertOptions& options_;
   std::uint64_t texture_bytes_;
   std::uint64_t limit_;
-  const Prefilter& prefilter_;
+  std::string scratch_folder_;
   int threads_;
-  std::optional<Prefilter> smoothing_;  ///< where codes may be chosen from several
-  bool reads_whole_rows_ = false;       ///< tiles of a row are cut from whole rows of the source
-  bool has_bands_ = false;              ///< of heights or coefficients, instead of tiles' own pieces
-  std::int64_t tile_rows_ = 0;          ///< of the source, that a row of tiles reads
-  std::int64_t tile_columns_ = 0;       ///< of the source, that a tile reads
+  std::int64_t halo_ = 0;          ///< samples around a tile's window that its coefficients depend on
+  std::int64_t tile_rows_ = 0;     ///< of the source, that a tile reads
+  std::int64_t tile_columns_ = 0;  ///< of the source, that a tile reads
 };
 
 }  // namespace
@@ -231,20 +255,21 @@ MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const Conve
   const Estimate least(source, plan, options, job, prefilter, texture_bytes, 1);
   const std::uint64_t least_bytes =
       std::min(least.with(kRations.back(), false).bytes, least.with(kRations.back(), true).bytes);
+  const bool needs_windows = estimate.needs_windows();
   const auto choose = [&]() -> MemoryPlan {
     if (job.memory_bytes == 0) {
-      const MemoryPlan fastest = estimate.with(kRations[kUnlimitedRation], false);
+      const MemoryPlan fastest = estimate.with(kRations[kUnlimitedRation], needs_windows);
       if (job.bound_bytes() == 0 || fastest.bytes <= job.bound_bytes()) return fastest;
     }
-    for (const bool in_scratch : {false, true}) {
+    for (const bool in_windows : {needs_windows, true}) {
       for (const Ration& ration : kRations) {
-        const MemoryPlan memory = estimate.with(ration, in_scratch);
+        const MemoryPlan memory = estimate.with(ration, in_windows);
         if (memory.bytes <= job.bound_bytes()) return memory;
       }
     }
-    const MemoryPlan in_memory = estimate.with(kRations.back(), false);
-    const MemoryPlan in_scratch = estimate.with(kRations.back(), true);
-    return in_scratch.bytes < in_memory.bytes ? in_scratch : in_memory;
+    const MemoryPlan in_rows = estimate.with(kRations.back(), needs_windows);
+    const MemoryPlan in_windows = estimate.with(kRations.back(), true);
+    return in_windows.bytes < in_rows.bytes ? in_windows : in_rows;
   };
   MemoryPlan memory = choose();
   memory.least_bytes = least_bytes;
@@ -261,36 +286,11 @@ MemoryPlan plan_memory(const HeightSource& source, const Plan& plan, const Conve
   return plan_memory(source, plan, options, job, texture_bytes);
 }
 
-namespace {
-
-/// What takes less memory, if something does: rows of the source that stay rows, or a part of it.
-std::string remedy_for(const HeightSource& source, const Plan& plan, const ConvertOptions& options, const Job& job) {
-  if (!plan.frame.warp) return "smaller tiles (`shape`)";
-  ConvertOptions other = options;
-  ProjectionRequest& kept = other.plan.ground.projection;
-  const bool in_degrees = source.info().georeference.unit == HorizontalUnit::kDegree;
-  kept = {};
-  kept.is_auto = false;
-  kept.kind = in_degrees ? ProjectionKind::kEquirectangular : ProjectionKind::kNone;
-  const std::string part = options.source_note.mosaic ? "one conversion for each input" : "a part of it (`bbox`)";
-  try {
-    const MemoryPlan less = plan_memory(source, make_plan(source.info(), other.plan), other, job);
-    if (less.bytes > job.bound_bytes()) return part;
-    return fmt::format("`projection` {}, which takes {}, or {}", kept.name(), in_bytes(static_cast<double>(less.bytes)),
-                       part);
-  } catch (const Error&) {  // which that projection is not for
-    return part;
-  }
-}
-
-}  // namespace
-
-void check_memory(const HeightSource& source, const Plan& plan, const ConvertOptions& options, const MemoryPlan& memory,
-                  const Job& job) {
+void check_memory(const HeightSource& source, const MemoryPlan& memory, const Job& job) {
   if (job.bound_bytes() == 0 || memory.bytes <= job.bound_bytes()) return;
   try {
     require_memory(job, static_cast<double>(memory.bytes), static_cast<double>(memory.least_bytes), "this conversion",
-                   remedy_for(source, plan, options, job));
+                   "smaller tiles (`shape`)");
   } catch (const Error& error) {
     throw error.within(source.info().path);
   }

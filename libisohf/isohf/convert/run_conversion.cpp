@@ -49,7 +49,7 @@ struct Outliers {
 /// A tile on its way through the pipeline.
 struct TileJob {
   TileIndex index{};
-  std::shared_ptr<const CodeSource::Part> part;
+  CodeSource::Part part;
   EncodedTile encoded;
   Outliers outliers;
   PlaneSample planes;
@@ -111,15 +111,15 @@ struct VoidTile {
         encoded(encode_tile(conversion.plan.grid.shape(), codes, conversion.options.effort)) {}
 };
 
-void make_tile(const Conversion& conversion, const CodeSource& source, const CountedVertices& counted,
+void make_tile(const Conversion& conversion, CodeSource& source, const CountedVertices& counted,
                const VoidTile& nothing, const Stages& stages, bool is_new, TileJob& tile) {
   const TileShape& shape = conversion.plan.grid.shape();
   std::vector<float> heights;
   TileCodes codes;
-  const std::optional<QuantiserCounts> counts = source.cut(tile.index, *tile.part, heights, codes);
+  const std::optional<QuantiserCounts> counts = source.cut(tile.index, tile.part, heights, codes);
   if (!counts) {
     tile.encoded = nothing.encoded;
-    tile.encoded.statistics = tile_statistics(counted, tile.index, nothing.codes, conversion.quantisation);
+    tile.encoded.statistics = void_statistics(counted, tile.index);
     if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(tile.index, nothing.codes);
     tile.seeds.is_empty = true;
     return;
@@ -139,8 +139,7 @@ void make_tile(const Conversion& conversion, const CodeSource& source, const Cou
   if (stages.textures != nullptr && is_new && !encoded.is_empty) tile.texture = stages.textures->encode(tile.index);
 }
 
-/// Second pass: read -> resample and encode -> write in order. The number of tiles in flight is fixed, and so is the
-/// number of parts of the source: one that is being cut and one that is being read.
+/// Second pass: read -> resample and encode -> write in order. The number of tiles in flight is fixed.
 void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stages& stages) {
   const TileGrid& grid = conversion.plan.grid;
   CodeSource source(conversion);
@@ -151,7 +150,6 @@ void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stag
   std::int64_t next = stages.seeds != nullptr
                           ? std::max(SeedStage::first_tile_needed(grid, first_new), conversion.first_tile)
                           : first_new;
-  std::shared_ptr<const CodeSource::Part> part;
 
   // Tiles leave the pipeline in the order in which they enter it, so that a ring of as many as may be in flight always
   // has the next one free. The pipeline itself only hands on pointers: it forgets to destroy what it holds when a stage
@@ -162,23 +160,18 @@ void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stag
   const auto read = [&](oneapi::tbb::flow_control& control) -> TileJob* {
     conversion.job.throw_if_cancelled();
     if (next == conversion.end_tile) {
-      part.reset();
       control.stop();
       return nullptr;
     }
     TileJob* tile = &ring[entered++ % ring.size()];
     *tile = {};
     tile->index = grid.tile_at(next++);
-    if (!part || !part->holds(tile->index)) {
-      part.reset();
-      part = source.read(tile->index);
-    }
-    tile->part = part;
+    tile->part = source.read(tile->index);
     return tile;
   };
   const auto encode = [&](TileJob* tile) {
     make_tile(conversion, source, counted, nothing, stages, grid.flat_index(tile->index) >= first_new, *tile);
-    tile->part.reset();
+    tile->part = {};
     return tile;
   };
   std::int64_t written = next;
@@ -319,7 +312,7 @@ Plan plan_conversion(const SourceInfo& info, const ConvertOptions& options) {
 ShardRange find_shard_range(HeightSource& source, const ConvertOptions& options, const Job& job) {
   const Plan plan = plan_conversion(source.info(), options);
   const MemoryPlan memory = plan_memory(source, plan, options, job);
-  check_memory(source, plan, options, memory, job);
+  check_memory(source, memory, job);
   const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));
   Conversion conversion{source, options, plan, memory, kernel, Prefilter::make(kernel.filter(), options.acquisition),
                         job};
@@ -357,7 +350,7 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
   const MemoryPlan memory =
       plan_memory(source, plan, options, job,
                   (textures ? textures->memory_bytes() : 0) + TilesAround::memory_bytes(plan.grid, beside));
-  check_memory(source, plan, options, memory, job);
+  check_memory(source, memory, job);
   if (options.lossless && info.fill_distance > 0 && &source.as_stored() == &source) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{}: `lossless` keeps the samples as they were before `fill`, which are out of reach; "

@@ -11,7 +11,7 @@
 
 #include "isohf/base/sample.h"
 #include "isohf/error.h"
-#include "isohf/sampling/source/source_rows.h"
+#include "isohf/sampling/source/read_step.h"
 
 namespace isohf {
 namespace {

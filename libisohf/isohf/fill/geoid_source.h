@@ -37,6 +37,7 @@ class GeoidSource final : public HeightSource {
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
   void read_window(const Window& window, std::span<std::byte> samples) override;
+  [[nodiscard]] bool is_gap(const Window& window) const override { return source_->is_gap(window); }
   [[nodiscard]] std::uint64_t buffer_bytes() const override;
 
  private:

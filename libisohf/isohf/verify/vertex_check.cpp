@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include "isohf/archive/metadata/cut_record.h"
@@ -13,7 +15,7 @@
 #include "isohf/error.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/sampling/resample/height_error.h"
-#include "isohf/sampling/source/band_reader.h"
+#include "isohf/sampling/source/height_rows.h"
 #include "isohf/sampling/source/source_statistics.h"
 #include "isohf/surface.h"
 #include "isohf/verify.h"
@@ -58,20 +60,15 @@ class VertexCheck {
   VertexReport run(const Job& job) {
     const auto cutter = make_tile_resampler(grid_, archive_geometry(metadata_), kernel_,
                                             {limits_.lowest - datum_, limits_.highest - datum_});
-    const Ways ways = choose_ways(*cutter, job);
-    SourceRows rows = ways.kept_rows > 0 ? SourceRows(source_, ways.step, job.scratch_folder, ways.kept_rows)
-                                         : SourceRows(source_, ways.step);
-    BandReader reader(rows, datum_, prefilter_, archive_geometry(metadata_).wraps_x);
+    HeightRows rows(source_, datum_, archive_geometry(metadata_).wraps_x, choose_memory(job));
     std::vector<VertexReport> tiles(static_cast<std::size_t>(grid_.tile_columns()));
     for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
-      for (std::int64_t first = 0; first < grid_.tile_columns(); first += ways.tile_columns) {
+      const RowRange needed = cutter->rows_needed(row);
+      rows.drop_before(rows.with_halo({0, needed.first, 1, 1}, prefilter_).row);
+      oneapi::tbb::parallel_for(std::int64_t{0}, grid_.tile_columns(), [&](std::int64_t column) {
         job.throw_if_cancelled();
-        const std::int64_t end = std::min(first + ways.tile_columns, grid_.tile_columns());
-        const auto band = reader.read(cutter->rows_needed(row), columns_of(*cutter, first, end));
-        oneapi::tbb::parallel_for(first, end, [&](std::int64_t column) {
-          tiles[static_cast<std::size_t>(column)] = check_tile(*cutter, *band, {column, row});
-        });
-      }
+        tiles[static_cast<std::size_t>(column)] = check_tile(*cutter, rows, {column, row});
+      });
       for (const VertexReport& tile : tiles) add(tile);
       job.report({"resample", "rows", row + 1, grid_.tile_rows()});
     }
@@ -79,64 +76,30 @@ class VertexCheck {
   }
 
  private:
-  /// How the source is read: with a file for its rows where these are too many for memory, a few columns at a time.
-  struct Ways {
-    ReadStep step;
-    std::int64_t kept_rows = 0;
-    std::int64_t tile_columns;
-  };
-
-  /// The source's columns under some columns of tiles.
-  [[nodiscard]] RowRange columns_of(const TileResampler& cutter, std::int64_t first, std::int64_t end) const {
-    if (first == 0 && end == grid_.tile_columns()) return {0, source_.info().width - 1};
-    RowRange columns = cutter.columns_needed(first);
-    for (std::int64_t column = first + 1; column < end; ++column) {
-      const RowRange needed = cutter.columns_needed(column);
-      columns = {std::min(columns.first, needed.first), std::max(columns.last, needed.last)};
-    }
-    return columns;
-  }
-
   /// Throws Error{kOutOfMemory}.
-  Ways choose_ways(const TileResampler& cutter, const Job& job) {
-    constexpr std::uint64_t kReadBytes = std::uint64_t{8} << 20U;
-    constexpr std::uint64_t kLeastReadBytes = std::uint64_t{1} << 20U;
+  CellStore choose_memory(const Job& job) {
+    constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20U;
+    constexpr std::uint64_t kLeastBytes = std::uint64_t{8} << 20U;
     const SourceInfo& info = source_.info();
-    Ways ways{ReadStep::make(info, kReadBytes), 0, grid_.tile_columns()};
-    if (job.bound_bytes() == 0) return ways;
-    std::int64_t rows = 1;
-    for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
-      const RowRange needed = cutter.rows_needed(row);
-      rows = std::max(rows, needed.last - needed.first + 1);
-    }
-    rows = std::min(rows + 2 * prefilter_.halo(), info.height);
     const auto vertices = static_cast<double>(grid_.shape().stored_vertex_count());
-    const double row_bytes = static_cast<double>(size_bytes(info.sample_type)) * static_cast<double>(info.width);
-    const auto bytes = [&](const Ways& way) {
-      const RowRange columns = columns_of(cutter, 0, way.tile_columns);
-      const double raw = way.kept_rows > 0
-                             ? static_cast<double>(way.step.most_bytes(info))
-                             : static_cast<double>(std::min(rows + 2 * way.step.rows, info.height)) * row_bytes;
-      return reading_bytes(job, vertices) + 24.0 * threads_of(job) * vertices +
-             static_cast<double>(source_.buffer_bytes()) + raw +
-             static_cast<double>(
-                 BandReader::memory_bytes(prefilter_, 2, rows, columns.last - columns.first + 1, info)) +
-             static_cast<double>(grid_.tile_columns()) * sizeof(VertexReport);
-    };
-    const auto limit = static_cast<double>(job.bound_bytes());
-    if (bytes(ways) <= limit) return ways;
-    ways.step = ReadStep::make(info, kLeastReadBytes);
-    ways.kept_rows = SourceRows::kept_rows_for(ways.step, rows);
-    const SourceGeometry geometry = archive_geometry(metadata_);
-    const bool in_parts = !geometry.wraps_x && !geometry.warp;
-    while (in_parts && ways.tile_columns > 1 && bytes(ways) > limit) ways.tile_columns = (ways.tile_columns + 1) / 2;
-    require_memory(job, bytes(ways), bytes(ways), "comparing", "");
-    return ways;
+    const double needed = reading_bytes(job, vertices) + 40.0 * threads_of(job) * vertices +
+                          static_cast<double>(source_.buffer_bytes()) + 2.0 * kLeastBytes +
+                          static_cast<double>(grid_.tile_columns()) * sizeof(VertexReport);
+    require_memory(job, needed, needed, "comparing", "");
+    const double more = static_cast<double>(job.bound_bytes()) - needed;
+    const std::uint64_t most =
+        job.bound_bytes() == 0 ? kMostBytes : std::min(kMostBytes, kLeastBytes + static_cast<std::uint64_t>(more));
+    return CellStore::of_windows(info, most, job.scratch_folder);
   }
 
-  [[nodiscard]] VertexReport check_tile(const TileResampler& cutter, const Band& band, TileIndex tile) const {
+  [[nodiscard]] VertexReport check_tile(const TileResampler& cutter, HeightRows& rows, TileIndex tile) const {
     std::vector<float> heights(static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
-    cutter.cut(tile, band.view(), heights);
+    Band band;
+    const auto read = [&](const Window& window) -> std::optional<SourceBand> {
+      if (!rows.read(window, prefilter_, band)) return std::nullopt;
+      return band.view();
+    };
+    if (!cutter.cut(tile, read, heights)) std::ranges::fill(heights, std::numeric_limits<float>::quiet_NaN());
     const std::vector<double> stored = archive_.read_elevations(tile);
     VertexReport found;
     for (std::size_t i = 0; i < heights.size(); ++i) {

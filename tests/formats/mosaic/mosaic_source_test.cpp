@@ -325,6 +325,25 @@ TEST_F(MosaicSource, FilesThatDisagreeAreRefusedByName) {
   EXPECT_THAT(why_refused({folder / "a.tif", folder / "none.tif"}), HasSubstr("none.tif: no such file"));
 }
 
+TEST_F(MosaicSource, TellsTheGapsBetweenItsFiles) {
+  const RasterSpec spec = placed_spec(40, 30, SampleType::kFloat32, Registration::kArea);
+  raster_of<float>(spec, [](auto, auto) { return 1.0; }).cut(folder / "a.tif", {0, 0, 10, 10});
+  raster_of<float>(spec, [](auto, auto) { return 2.0; }).cut(folder / "b.tif", {30, 20, 10, 10});
+  const std::unique_ptr<HeightSource> mosaic = open_mosaic({folder / "a.tif", folder / "b.tif"});
+  int gaps = 0;
+  for (std::int64_t row = 0; row < 28; row += 3) {
+    for (std::int64_t column = 0; column < 37; column += 3) {
+      const Window window{column, row, 3, 2};
+      std::vector<float> samples(6);
+      mosaic->read_window(window, std::as_writable_bytes(std::span(samples)));
+      const bool is_void = std::ranges::all_of(samples, [](float sample) { return std::isnan(sample); });
+      EXPECT_EQ(mosaic->is_gap(window), is_void) << column << " " << row;
+      gaps += is_void ? 1 : 0;
+    }
+  }
+  EXPECT_GT(gaps, 60);
+}
+
 TEST_F(MosaicSource, HeightsAreNamedAlikeWhicheverFileComesFirst) {
   RasterSpec spec = placed_spec(30, 10, SampleType::kFloat32, Registration::kArea);
   const auto cut = [&](const char* name, std::int64_t column, const char* datum, std::optional<int> code) {

@@ -343,18 +343,6 @@ void check(const PlanRequest& request) {
   }
 }
 
-/// The source rows that a row of tiles reads, at most, without the kernel's taps.
-double band_rows(const Plan& plan) {
-  if (!plan.frame.warp) return plan.grid.shape().rows() * plan.grid.sigma_z() / plan.frame.spacing_z;
-  const SourceWarp warp(plan.grid, *plan.frame.warp, 0.0);
-  const auto last = static_cast<double>(plan.frame.height - 1);
-  double most = 0.0;
-  for (const SourceWarp::RowBounds& bounds : warp.reading_bounds(true)) {
-    most = std::max(most, std::clamp(bounds.most, 0.0, last) - std::clamp(bounds.least, 0.0, last));
-  }
-  return most + 2.0;
-}
-
 }  // namespace
 
 Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
@@ -388,7 +376,6 @@ Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
                     "larger `spacing`, a smaller `density` or fewer `tiles`",
                     plan.density, kMostDensityAsked));
   }
-  plan.band_rows = band_rows(plan);
   plan.lattice_samples = shape.stored_vertex_count() * plan.grid.tile_count();
   constexpr double kTypicalBits = 5.0;
   plan.estimated_bytes = static_cast<std::uint64_t>(static_cast<double>(plan.lattice_samples) * kTypicalBits / 8.0 +

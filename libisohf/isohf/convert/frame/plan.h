@@ -18,7 +18,6 @@ struct Plan {
   Outside outside = Outside::kCover;
   double density = 1.0;               ///< lattice samples for one source sample, as it came out
   std::int64_t lattice_samples = 0;   ///< C*R for all tiles
-  double band_rows = 0.0;             ///< source rows that a row of tiles reads, at most, without the kernel's taps
   std::uint64_t estimated_bytes = 0;  ///< of the archive, from typical bits per sample; an estimate
 };
 

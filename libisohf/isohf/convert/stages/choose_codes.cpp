@@ -6,11 +6,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
+#include "isohf/base/sample.h"
 #include "isohf/convert/conversion.h"
 #include "isohf/convert/stages/choose_quantisation.h"
-#include "isohf/convert/stages/tile_source.h"
+#include "isohf/convert/stages/code_source.h"
 #include "isohf/error.h"
 #include "isohf/sampling/resample/height_error.h"
 #include "isohf/sampling/source/edge_range.h"
@@ -35,6 +37,12 @@ SourceSurvey survey_window(const SourceInfo& info, std::span<const std::byte> ra
       });
 }
 
+/// A raw sample without an elevation, of a source that has gaps.
+double void_sample(const SourceInfo& info) {
+  if (is_floating(info.sample_type)) return std::numeric_limits<double>::quiet_NaN();
+  return info.void_values.empty() ? sample_range(info.sample_type).first : info.void_values.front();
+}
+
 /// First pass: range and counts of the source. While one window is looked at the next one is read.
 SourceSurvey survey_source(const Conversion& conversion, EdgeRange& edge) {
   HeightSource& source = conversion.source;
@@ -43,10 +51,25 @@ SourceSurvey survey_source(const Conversion& conversion, EdgeRange& edge) {
   SourceSurvey survey(info, false);
   std::vector<std::byte> now;
   std::vector<std::byte> next;
+  std::vector<std::byte> nothing;  ///< of the largest gap so far
   std::vector<Window> windows = step.windows(info, 0);
+  const std::size_t sample_bytes = size_bytes(info.sample_type);
+  const auto bytes_of = [&](const Window& window) {
+    return static_cast<std::size_t>(window.columns * window.rows) * sample_bytes;
+  };
   const auto read = [&](const Window& window, std::vector<std::byte>& raw) {
-    raw.resize(static_cast<std::size_t>(window.columns * window.rows) * size_bytes(info.sample_type));
+    raw.clear();
+    if (source.is_gap(window)) return;
+    raw.resize(bytes_of(window));
     source.read_window(window, raw);
+  };
+  const auto pass_over = [&](const Window& window) {
+    for (std::size_t at = nothing.size(); at < bytes_of(window); at += sample_bytes) {
+      nothing.resize(at + sample_bytes);
+      store_sample(info.sample_type)(void_sample(info), nothing.data() + at);
+    }
+    survey.add_voids(window.columns * window.rows);
+    edge.add_window(window, std::span(nothing).first(bytes_of(window)));
   };
   read(windows.front(), now);
   for (std::size_t i = 0; i < windows.size();) {
@@ -57,6 +80,7 @@ SourceSurvey survey_source(const Conversion& conversion, EdgeRange& edge) {
       i = 0;
     }
     const auto look = [&] {
+      if (now.empty()) return pass_over(window);
       survey.add(survey_window(info, now));
       edge.add_window(window, now);
     };
@@ -96,26 +120,21 @@ void warn_of_unit_range(const SourceInfo& info, const ElevationRange& range, std
 /// The range of the surface itself, for kernels that leave the range of their samples: cuts every tile, keeps none.
 ElevationRange measure_surface(const Conversion& conversion, const ElevationRange& limits) {
   const TileGrid& grid = conversion.plan.grid;
-  TileSource tiles(conversion, {limits.min - conversion.datum, limits.max - conversion.datum}, conversion.prefilter);
+  CodeSource tiles(conversion, {limits.min - conversion.datum, limits.max - conversion.datum});
   std::vector<ElevationRange> ranges(static_cast<std::size_t>(grid.tile_columns()), {HUGE_VAL, -HUGE_VAL});
-  std::int64_t next = 0;
-  while (next < grid.tile_count()) {
-    conversion.job.throw_if_cancelled();
-    const std::int64_t first = next;
-    const std::shared_ptr<const TileSource::Part> part = tiles.read(grid.tile_at(first));
-    while (next < grid.tile_count() && part->holds(grid.tile_at(next))) ++next;
-    oneapi::tbb::parallel_for(first, next, [&](std::int64_t flat) {
-      const TileIndex tile = grid.tile_at(flat);
+  for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
+    const std::int64_t first = row * grid.tile_columns();
+    tiles.for_each(first, first + grid.tile_columns(), [&](std::int64_t flat, const CodeSource::Part& part) {
       std::vector<float> heights(static_cast<std::size_t>(grid.shape().stored_vertex_count()));
-      if (!tiles.cut(tile, *part, heights)) return;
-      ElevationRange& range = ranges[static_cast<std::size_t>(tile.column)];
+      if (!tiles.heights(grid.tile_at(flat), part, heights)) return;
+      ElevationRange& range = ranges[static_cast<std::size_t>(flat - first)];
       for (const float height : heights) {
         const double elevation = double{height} + conversion.datum;  // NaN compares false
         range.min = elevation < range.min ? elevation : range.min;
         range.max = elevation > range.max ? elevation : range.max;
       }
     });
-    conversion.job.report({"range", "rows", next / grid.tile_columns(), grid.tile_rows()});
+    conversion.job.report({"range", "rows", row + 1, grid.tile_rows()});
   }
   ElevationRange all{HUGE_VAL, -HUGE_VAL};
   for (const ElevationRange& range : ranges) {

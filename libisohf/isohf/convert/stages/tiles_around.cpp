@@ -1,7 +1,5 @@
 #include "isohf/convert/stages/tiles_around.h"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include "isohf/archive/deflate/deflate.h"
 #include "isohf/archive/tile/tile_decoder.h"
 #include "isohf/archive/tile/tile_encoder.h"
@@ -18,23 +16,15 @@ TilesAround::TilesAround(const Conversion& conversion, const RowRange& north, co
 void TilesAround::make(const RowRange& rows) {
   const TileGrid& grid = conversion_.plan.grid;
   CodeSource source(conversion_);
-  std::int64_t next = rows.first * grid.tile_columns();
+  const std::int64_t first = rows.first * grid.tile_columns();
   const std::int64_t end = (rows.last + 1) * grid.tile_columns();
-  while (next < end) {
-    conversion_.job.throw_if_cancelled();
-    const std::int64_t first = next;
-    const std::shared_ptr<const CodeSource::Part> part = source.read(grid.tile_at(first));
-    while (next < end && part->holds(grid.tile_at(next))) ++next;
-    std::vector<EncodedTile> made(static_cast<std::size_t>(next - first));
-    oneapi::tbb::parallel_for(std::size_t{0}, made.size(), [&](std::size_t i) {
-      std::vector<float> heights;
-      TileCodes codes;
-      made[i].is_empty = true;
-      if (!source.cut(grid.tile_at(first + static_cast<std::int64_t>(i)), *part, heights, codes)) return;
-      made[i] = encode_tile(grid.shape(), codes, Effort::kFast);
-    });
-    for (std::size_t i = 0; i < made.size(); ++i) tiles_[first + static_cast<std::int64_t>(i)] = std::move(made[i]);
-  }
+  for (std::int64_t flat = first; flat < end; ++flat) tiles_[flat].is_empty = true;
+  source.for_each(first, end, [&](std::int64_t flat, const CodeSource::Part& part) {
+    std::vector<float> heights;
+    TileCodes codes;
+    if (source.cut(grid.tile_at(flat), part, heights, codes))
+      tiles_.at(flat) = encode_tile(grid.shape(), codes, Effort::kFast);
+  });
 }
 
 TileCodes TilesAround::codes(TileIndex tile) const {

@@ -339,7 +339,7 @@ void SourceWarp::positions(TileIndex tile, std::span<double> u, std::span<double
   }
 }
 
-SourceWarp::RowBounds SourceWarp::row_bounds(std::int64_t tile_row, bool rough) const {
+SourceWarp::RowBounds SourceWarp::row_bounds(std::int64_t tile_row) const {
   // A latitude, and the northing of another map, have their extremes over a rectangle of the map on its sides, but for
   // a pole inside.
   const TileShape& shape = grid_.shape();
@@ -366,13 +366,12 @@ SourceWarp::RowBounds SourceWarp::row_bounds(std::int64_t tile_row, bool rough) 
     }
   };
   constexpr std::int64_t kStep = 32;
-  constexpr std::int64_t kRoughSteps = 256;
-  const std::int64_t most_steps = rough ? kRoughSteps : std::numeric_limits<std::int64_t>::max();
+  constexpr std::int64_t kMostSteps = 256;
   const auto between = [](std::int64_t a, std::int64_t b, double share) {
     return static_cast<double>(a) + share * static_cast<double>(b - a);
   };
   for (const std::int64_t z : {first_z, last_z}) {
-    walk(std::min((last_x - first_x) / kStep + 4, most_steps), [&](double share) {
+    walk(std::min((last_x - first_x) / kStep + 4, kMostSteps), [&](double share) {
       return std::pair{between(first_x, last_x, share), static_cast<double>(z)};
     });
   }
@@ -401,9 +400,9 @@ SourceWarp::RowBounds SourceWarp::row_bounds(std::int64_t tile_row, bool rough) 
   return {bounds.least - margin, bounds.most + margin};
 }
 
-std::vector<SourceWarp::RowBounds> SourceWarp::reading_bounds(bool rough) const {
+std::vector<SourceWarp::RowBounds> SourceWarp::reading_bounds() const {
   std::vector<RowBounds> bounds;
-  for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) bounds.push_back(row_bounds(row, rough));
+  for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) bounds.push_back(row_bounds(row));
   for (std::size_t row = 1; row < bounds.size(); ++row) {
     bounds[row].most = std::max(bounds[row].most, bounds[row - 1].most);
     const std::size_t back = bounds.size() - 1 - row;

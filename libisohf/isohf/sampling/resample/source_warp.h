@@ -77,16 +77,19 @@ class SourceWarp {
   /// u, v [C x R] out, all stored vertices of the tile; u goes on beyond a turn where that is nearer to the neighbours.
   void positions(TileIndex tile, std::span<double> u, std::span<double> v) const;
 
-  /// Bounds of v over all stored vertices of a row of tiles.
+  /// A place of the lattice, exactly; u as ExactWarp counts it, or on the turn nearest to near_u.
+  [[nodiscard]] SourcePosition at(double x, double z) const;
+  [[nodiscard]] SourcePosition at(double x, double z, double near_u) const;
+
+  /// Bounds of v over all stored vertices of a row of tiles, from a few hundred places.
   struct RowBounds {
     double least;
     double most;
   };
-  /// rough  in a few hundred steps at most, with a margin that allows for them
-  [[nodiscard]] RowBounds row_bounds(std::int64_t tile_row, bool rough = false) const;
+  [[nodiscard]] RowBounds row_bounds(std::int64_t tile_row) const;
   /// The bounds of every row of tiles, widened so that neither end goes back from one to the next (around a pole it
   /// would): a source is read once, from North to South.
-  [[nodiscard]] std::vector<RowBounds> reading_bounds(bool rough = false) const;
+  [[nodiscard]] std::vector<RowBounds> reading_bounds() const;
 
   [[nodiscard]] const ExactWarp& exact() const { return exact_; }
 
@@ -94,8 +97,6 @@ class SourceWarp {
   struct Block;
   struct Target;
   void fill(const Block& block, const Target& target) const;
-  [[nodiscard]] SourcePosition at(double x, double z) const;
-  [[nodiscard]] SourcePosition at(double x, double z, double near_u) const;
   [[nodiscard]] bool is_beyond_reach(std::span<const SourcePosition> positions) const;
 
   TileGrid grid_;

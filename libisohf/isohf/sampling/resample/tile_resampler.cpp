@@ -72,15 +72,33 @@ LatticeAround around_of(const TileGrid& grid, const SourceAxis& x, const SourceA
           nullptr};
 }
 
+Window window_of(const RowRange& columns, const RowRange& rows) {
+  return {columns.first, rows.first, columns.last - columns.first + 1, rows.last - rows.first + 1};
+}
+
+/// The samples that the kernel reads between two positions on an axis, and the void rule around them.
+RowRange needed_between(const SourceAxis& axis, const Kernel& kernel, std::int64_t reach, double least, double most) {
+  const std::int64_t end = axis.samples() - 1;
+  const std::int64_t beyond = reach > kernel.taps() / 2 ? reach : 0;
+  RowRange range{kernel.at(least).first, kernel.at(most).first + kernel.taps() - 1};
+  const bool is_across = range.first - beyond < 0 || range.last + beyond > end;
+  if (axis.wraps() && is_across) return {0, end};
+  // Taps beyond an end are made of those as far inside.
+  range = {std::min(range.first, 2 * end - range.last), std::max(range.last, -range.first)};
+  return {std::max<std::int64_t>(range.first - beyond, 0), std::min(range.last + beyond, end)};
+}
+
 class GridResampler final : public TileResampler {
  public:
   GridResampler(const TileGrid& grid, const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel,
                 const ElevationRange& limits, double coarser);
 
-  [[nodiscard]] RowRange rows_needed(std::int64_t tile_row) const override;
-  [[nodiscard]] RowRange columns_needed(std::int64_t tile_column) const override;
+  [[nodiscard]] RowRange rows_needed(std::int64_t tile_row) const override {
+    return rows_[static_cast<std::size_t>(tile_row)];
+  }
+  [[nodiscard]] std::optional<Window> window_about(TileIndex tile) const override;
   /// O(C*R*taps); no allocation proportional to anything but the tile.
-  void cut(TileIndex tile, const SourceBand& band, std::span<float> heights) const override;
+  bool cut(TileIndex tile, const ReadBand& read, std::span<float> heights) const override;
 
  private:
   TileGrid grid_;
@@ -88,6 +106,8 @@ class GridResampler final : public TileResampler {
   Kernel kernel_;
   LatticeAround around_;
   RowSampler sampler_;
+  std::vector<RowRange> rows_;     ///< that each row of tiles reads
+  std::vector<RowRange> columns_;  ///< that each column of tiles reads
 };
 
 GridResampler::GridResampler(const TileGrid& grid, const SourceAxis& axis_x, const SourceAxis& axis_z,
@@ -96,36 +116,42 @@ GridResampler::GridResampler(const TileGrid& grid, const SourceAxis& axis_x, con
       axis_x_(axis_x),
       kernel_(kernel),
       around_(around_of(grid, axis_x, axis_z, coarser)),
-      sampler_(axis_x, axis_z, kernel, limits, around_) {}
-
-RowRange GridResampler::rows_needed(std::int64_t tile_row) const {
-  RowRange range = RowRange::none();
-  for (int r = 0; r < grid_.shape().rows(); ++r) {
-    sampler_.add_rows_needed(grid_.world_from_lattice(grid_.lattice_vertex({0, tile_row}, {0, r})).z, range);
+      sampler_(axis_x, axis_z, kernel, limits, around_),
+      rows_(static_cast<std::size_t>(grid.tile_rows()), RowRange::none()),
+      columns_(static_cast<std::size_t>(grid.tile_columns()), RowRange::none()) {
+  for (std::int64_t row = 0; row < grid.tile_rows(); ++row) {
+    for (int r = 0; r < grid.shape().rows(); ++r) {
+      sampler_.add_rows_needed(grid.world_from_lattice(grid.lattice_vertex({0, row}, {0, r})).z,
+                               rows_[static_cast<std::size_t>(row)]);
+    }
   }
-  return range;
+  for (std::int64_t column = 0; column < grid.tile_columns(); ++column) {
+    for (const int parity : {0, 1}) {
+      add_columns_needed(axis_x_, taps_of_tile(grid_, axis_x_, kernel_, {column, 0}, parity),
+                         around_.reach_x > kernel_.taps() / 2 ? around_.reach_x : 0,
+                         columns_[static_cast<std::size_t>(column)]);
+    }
+  }
 }
 
-RowRange GridResampler::columns_needed(std::int64_t tile_column) const {
-  RowRange range = RowRange::none();
-  for (const int parity : {0, 1}) {
-    add_columns_needed(axis_x_, taps_of_tile(grid_, axis_x_, kernel_, {tile_column, 0}, parity),
-                       around_.reach_x > kernel_.taps() / 2 ? around_.reach_x : 0, range);
-  }
-  return range;
+std::optional<Window> GridResampler::window_about(TileIndex tile) const {
+  return window_of(columns_[static_cast<std::size_t>(tile.column)], rows_[static_cast<std::size_t>(tile.row)]);
 }
 
-void GridResampler::cut(TileIndex tile, const SourceBand& band, std::span<float> heights) const {
+bool GridResampler::cut(TileIndex tile, const ReadBand& read, std::span<float> heights) const {
   const auto columns = static_cast<std::size_t>(grid_.shape().columns());
   ISOHF_ASSERT(heights.size() == static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
+  const std::optional<SourceBand> band = read(*window_about(tile));
+  if (!band) return false;
   const std::array<ColumnTaps, 2> taps = {taps_of_tile(grid_, axis_x_, kernel_, tile, 0),
                                           taps_of_tile(grid_, axis_x_, kernel_, tile, 1)};
   RowSampler::Scratch scratch;
   for (int r = 0; r < grid_.shape().rows(); ++r) {
     const double world_z = grid_.world_from_lattice(grid_.lattice_vertex(tile, {0, r})).z;
-    sampler_.sample(band, world_z, taps[static_cast<std::size_t>(r & 1)], scratch,
+    sampler_.sample(*band, world_z, taps[static_cast<std::size_t>(r & 1)], scratch,
                     heights.subspan(static_cast<std::size_t>(r) * columns, columns));
   }
+  return true;
 }
 
 constexpr float kVoidHeight = std::numeric_limits<float>::quiet_NaN();
@@ -187,6 +213,19 @@ LatticeAround around_of(const TileGrid& grid, const ExactWarp& warp, double coar
           &warp};
 }
 
+/// The positions on an axis that places from one to another read; least above most: none, since all of them lie further
+/// than `reach` beyond an end.
+SourceWarp::RowBounds read_between(const SourceAxis& axis, const SourceWarp::RowBounds& places, double reach) {
+  const auto last = static_cast<double>(axis.samples() - 1);
+  const auto inside = std::min(static_cast<double>(axis.continued_samples()), last);
+  if (places.most < -reach || places.least > last + reach) return {HUGE_VAL, -HUGE_VAL};
+  SourceWarp::RowBounds read{std::clamp(places.least, 0.0, last), std::clamp(places.most, 0.0, last)};
+  // What is continued reads the edge and as far inside as it lies outside.
+  if (places.least < 0.0) read.most = std::max(read.most, inside);
+  if (places.most > last) read.least = std::min(read.least, last - inside);
+  return read;
+}
+
 class WarpedResampler final : public TileResampler {
  public:
   /// The axes are those of positions (SourceAxis::of_positions, or one that wraps with spacing 1 for x). `limits` as in
@@ -197,12 +236,27 @@ class WarpedResampler final : public TileResampler {
   WarpedResampler& operator=(const WarpedResampler&) = delete;
 
   [[nodiscard]] RowRange rows_needed(std::int64_t tile_row) const override;
-  /// All: a column of tiles is no column of the source.
-  [[nodiscard]] RowRange columns_needed(std::int64_t) const override { return {0, axis_x_.samples() - 1}; }
+  [[nodiscard]] std::optional<Window> window_about(TileIndex tile) const override;
   /// O(C*R*taps^2).
-  void cut(TileIndex tile, const SourceBand& band, std::span<float> heights) const override;
+  bool cut(TileIndex tile, const ReadBand& read, std::span<float> heights) const override;
 
  private:
+  /// Positions along both axes.
+  struct Extent {
+    SourceWarp::RowBounds u{HUGE_VAL, -HUGE_VAL};
+    SourceWarp::RowBounds v{HUGE_VAL, -HUGE_VAL};
+
+    void add(double at_u, double at_v) {
+      u = {std::min(u.least, at_u), std::max(u.most, at_u)};
+      v = {std::min(v.least, at_v), std::max(v.most, at_v)};
+    }
+  };
+  /// u on the turn nearest to the source's middle; any number on an axis that wraps.
+  [[nodiscard]] double nearest_turn(double u) const;
+  /// Adds what a vertex at that position reads.
+  void add_read(double u, double v, Extent& read) const;
+  [[nodiscard]] Window window_of_positions(std::span<const double> u, std::span<const double> v) const;
+  [[nodiscard]] Window window_of_read(const Extent& read) const;
   void sample_row(const SourceBand& band, const double* u, const double* v, float* heights) const;
   /// Any position: continued, held, void or not.
   [[nodiscard]] float sample(const SourceBand& band, double u, double v) const;
@@ -212,6 +266,7 @@ class WarpedResampler final : public TileResampler {
   SourceAxis axis_x_;
   SourceAxis axis_z_;
   Kernel kernel_;
+  double reach_;  ///< samples beyond the source's ends that have an elevation, at most
   SourceWarp warp_;
   LatticeAround around_;
   std::vector<SourceWarp::RowBounds> bounds_;  ///< by tile row
@@ -226,7 +281,8 @@ WarpedResampler::WarpedResampler(const TileGrid& grid, const WarpPlace& place, c
       axis_x_(axis_x),
       axis_z_(axis_z),
       kernel_(kernel),
-      warp_(grid, place, reach_beyond(axis_x, axis_z, outside)),
+      reach_(reach_beyond(axis_x, axis_z, outside)),
+      warp_(grid, place, reach_),
       around_(around_of(grid, warp_.exact(), coarser)),
       bounds_(warp_.reading_bounds()),
       lowest_(static_cast<float>(limits.min)),
@@ -236,28 +292,97 @@ WarpedResampler::WarpedResampler(const TileGrid& grid, const WarpPlace& place, c
 }
 
 RowRange WarpedResampler::rows_needed(std::int64_t tile_row) const {
-  const SourceWarp::RowBounds& bounds = bounds_[static_cast<std::size_t>(tile_row)];
-  const std::int64_t count = axis_z_.samples();
-  RowRange range = RowRange::none();
-  const auto add = [&](double v) {
-    const std::int64_t first = kernel_.at(v).first;
-    for (std::int64_t row = first; row < first + kernel_.taps(); ++row) {
-      range.first = std::min(range.first, axis_z_.index(row));
-      range.last = std::max(range.last, axis_z_.index(row));
-    }
-  };
-  const auto last = static_cast<double>(count - 1);
-  add(std::clamp(bounds.least, 0.0, last));
-  add(std::clamp(bounds.most, 0.0, last));
-  // What is continued reads the edge and as far inside as it lies outside.
-  const auto inside = static_cast<double>(axis_z_.continued_samples());
-  if (bounds.least < 0.0) add(std::min(inside, last));
-  if (bounds.most > last) add(std::max(last - inside, 0.0));
-  if (around_.reach_z > kernel_.taps() / 2) {
-    range.first = std::max<std::int64_t>(range.first - around_.reach_z, 0);
-    range.last = std::min(range.last + around_.reach_z, count - 1);
+  const SourceWarp::RowBounds read = read_between(axis_z_, bounds_[static_cast<std::size_t>(tile_row)], HUGE_VAL);
+  return needed_between(axis_z_, kernel_, around_.reach_z, read.least, read.most);
+}
+
+double WarpedResampler::nearest_turn(double u) const {
+  if (axis_x_.wraps()) return u;
+  const double middle = static_cast<double>(axis_x_.samples() - 1) / 2.0;
+  return middle + std::remainder(u - middle, warp_.exact().place().columns_round());
+}
+
+void WarpedResampler::add_read(double u, double v, Extent& read) const {
+  if (std::isnan(u) || std::isnan(v)) return;
+  const SourceAxis::Place x = axis_x_.place(nearest_turn(u));
+  const SourceAxis::Place z = axis_z_.place(v);
+  if (!x.has_elevation || !z.has_elevation) return;
+  read.add(x.position, z.position);
+  if (x.continued || z.continued) read.add(x.continued ? x.edge : x.position, z.continued ? z.edge : z.position);
+}
+
+Window WarpedResampler::window_of_read(const Extent& read) const {
+  if (read.u.least > read.u.most || read.v.least > read.v.most) return {};
+  return window_of(needed_between(axis_x_, kernel_, around_.reach_x, read.u.least, read.u.most),
+                   needed_between(axis_z_, kernel_, around_.reach_z, read.v.least, read.v.most));
+}
+
+Window WarpedResampler::window_of_positions(std::span<const double> u, std::span<const double> v) const {
+  // Most tiles lie within the source: extremes of four vertices at a time, which a NaN does not change.
+  constexpr std::size_t kLanes = 4;
+  std::array<Extent, kLanes> lanes;
+  Extent all;
+  std::size_t i = 0;
+  for (; i + kLanes <= u.size(); i += kLanes) {
+    for (std::size_t k = 0; k < kLanes; ++k) lanes[k].add(u[i + k], v[i + k]);
   }
-  return range;
+  for (; i < u.size(); ++i) all.add(u[i], v[i]);
+  for (const Extent& lane : lanes) {
+    all.add(lane.u.least, lane.v.least);
+    all.add(lane.u.most, lane.v.most);
+  }
+  const bool is_inside = all.u.least >= 0.0 && all.u.most <= static_cast<double>(axis_x_.samples() - 1) &&
+                         all.v.least >= 0.0 && all.v.most <= static_cast<double>(axis_z_.samples() - 1);
+  if (!is_inside) {
+    all = {};
+    for (i = 0; i < u.size(); ++i) add_read(u[i], v[i], all);
+  }
+  return window_of_read(all);
+}
+
+std::optional<Window> WarpedResampler::window_about(TileIndex tile) const {
+  // The map at 3 x 3 places of the tile. Between these, u and v leave the range there by an eighth of their second
+  // differences; eight times as much is allowed for.
+  constexpr double kBeyond = 4.0;  // padding, in lattice units
+  const TileShape& shape = grid_.shape();
+  const double width = 2.0 * shape.cell_columns();
+  const double height = shape.cell_rows();
+  std::array<std::array<SourcePosition, 3>, 3> at;
+  const SourcePosition centre =
+      warp_.at((static_cast<double>(tile.column) + 0.5) * width, (static_cast<double>(tile.row) + 0.5) * height);
+  if (std::isnan(centre.u) || std::isnan(centre.v)) return std::nullopt;
+  const double near_u = nearest_turn(centre.u);
+  Extent seen;
+  for (std::size_t j = 0; j < 3; ++j) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double x =
+          (static_cast<double>(tile.column) + 0.5) * width + (static_cast<double>(i) - 1.0) * (0.5 * width + kBeyond);
+      const double z =
+          (static_cast<double>(tile.row) + 0.5) * height + (static_cast<double>(j) - 1.0) * (0.5 * height + kBeyond);
+      at[j][i] = warp_.at(x, z, near_u);
+      if (std::isnan(at[j][i].u) || std::isnan(at[j][i].v)) return std::nullopt;
+      seen.add(at[j][i].u, at[j][i].v);
+    }
+  }
+  SourcePosition bend;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto second = [](double a, double b, double c) { return std::abs(a - 2.0 * b + c); };
+    bend.u = std::max({bend.u, second(at[k][0].u, at[k][1].u, at[k][2].u), second(at[0][k].u, at[1][k].u, at[2][k].u)});
+    bend.v = std::max({bend.v, second(at[k][0].v, at[k][1].v, at[k][2].v), second(at[0][k].v, at[1][k].v, at[2][k].v)});
+  }
+  // Next to a pole rows turn round, and a tile may lie on either side of the far side of the body.
+  const double span_u = seen.u.most - seen.u.least;
+  const double span_v = seen.v.most - seen.v.least;
+  if (bend.u > 0.25 * span_u + 1.0 || bend.v > 0.25 * (span_u + span_v) + 1.0) return std::nullopt;
+  const SourcePosition margin{2.0 * bend.u + 1.0, 2.0 * bend.v + 1.0};
+  const SourceWarp::RowBounds u{seen.u.least - margin.u, seen.u.most + margin.u};
+  const SourceWarp::RowBounds v{seen.v.least - margin.v, seen.v.most + margin.v};
+  const auto last_u = static_cast<double>(axis_x_.samples() - 1);
+  const double round = warp_.exact().place().columns_round();
+  const bool keeps_off = u.least > 0.5 * last_u - 0.5 * round && u.most < 0.5 * last_u + 0.5 * round;
+  const bool is_within = u.least >= 0.0 && u.most <= last_u;
+  if (!is_within && (axis_x_.wraps() || !keeps_off)) return std::nullopt;
+  return window_of_read({read_between(axis_x_, u, reach_), read_between(axis_z_, v, reach_)});
 }
 
 float WarpedResampler::sample_inside(const SourceBand& band, double u, double v) const {
@@ -266,11 +391,7 @@ float WarpedResampler::sample_inside(const SourceBand& band, double u, double v)
 
 float WarpedResampler::sample(const SourceBand& band, double u, double v) const {
   if (std::isnan(u) || std::isnan(v)) return kVoidHeight;
-  if (!axis_x_.wraps()) {
-    // Beyond half a turn from the middle the other side is nearer.
-    const double middle = static_cast<double>(axis_x_.samples() - 1) / 2.0;
-    u = middle + std::remainder(u - middle, warp_.exact().place().columns_round());
-  }
+  u = nearest_turn(u);
   const SourceAxis::Place x = axis_x_.place(u);
   const SourceAxis::Place z = axis_z_.place(v);
   if (!x.has_elevation || !z.has_elevation) return kVoidHeight;
@@ -317,15 +438,20 @@ void WarpedResampler::sample_row(const SourceBand& band, const double* u, const 
   }
 }
 
-void WarpedResampler::cut(TileIndex tile, const SourceBand& band, std::span<float> heights) const {
+bool WarpedResampler::cut(TileIndex tile, const ReadBand& read, std::span<float> heights) const {
   const auto columns = static_cast<std::size_t>(grid_.shape().columns());
   ISOHF_ASSERT(heights.size() == static_cast<std::size_t>(grid_.shape().stored_vertex_count()));
   std::vector<double> u(heights.size());
   std::vector<double> v(heights.size());
   warp_.positions(tile, u, v);
+  const Window window = window_of_positions(u, v);
+  if (window.columns == 0) return false;
+  const std::optional<SourceBand> band = read(window);
+  if (!band) return false;
   for (std::size_t at = 0; at < heights.size(); at += columns) {
-    sample_row(band, u.data() + at, v.data() + at, heights.data() + at);
+    sample_row(*band, u.data() + at, v.data() + at, heights.data() + at);
   }
+  return true;
 }
 
 }  // namespace
@@ -347,6 +473,12 @@ SourceAxes make_axes(const TileGrid& grid, const SourceGeometry& geometry) {
   return {SourceAxis(geometry.width, geometry.first_sample_x, geometry.spacing_x, geometry.registration,
                      geometry.outside, kContinuedSteps * 2.0 * grid.sigma_x()),
           z};
+}
+
+void TileResampler::cut_from(const SourceBand& band, TileIndex tile, std::span<float> heights) const {
+  const bool has_any = cut(
+      tile, [&](const Window&) { return band; }, heights);
+  if (!has_any) std::ranges::fill(heights, kVoidHeight);
 }
 
 std::unique_ptr<TileResampler> make_grid_resampler(const TileGrid& grid, const SourceAxes& axes, const Kernel& kernel,

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 
 #include "isohf/lattice.h"
+#include "isohf/raster.h"
 #include "isohf/sampling/resample/kernels.h"
 #include "isohf/sampling/resample/source_warp.h"
 #include "isohf/sampling/source/source_axis.h"
@@ -22,16 +24,21 @@ class TileResampler {
  public:
   virtual ~TileResampler() = default;
 
-  /// The source rows that a row of tiles reads; at least one.
+  /// The source rows that a row of tiles reads, at least one; a superset where the source was projected.
   [[nodiscard]] virtual RowRange rows_needed(std::int64_t tile_row) const = 0;
 
-  /// The source columns that a column of tiles reads; at least one.
-  [[nodiscard]] virtual RowRange columns_needed(std::int64_t tile_column) const = 0;
+  /// The part of the source that a tile reads, or more; without columns: none of it. Quick, for reading ahead. nullopt
+  /// where only the places of the tile's vertices can show it.
+  [[nodiscard]] virtual std::optional<Window> window_about(TileIndex tile) const = 0;
 
-  /// Cuts one tile. `band` holds at least rows_needed(tile.row) and columns_needed(tile.column).
-  /// heights [C x R] out, relative to the band's datum; NaN where void: outside the source, or where less than half of
-  /// the kernel's weight, or none of the nearest samples, is valid.
-  virtual void cut(TileIndex tile, const SourceBand& band, std::span<float> heights) const = 0;
+  /// Returns a band that holds at least the window; nullopt: none of its samples has an elevation.
+  using ReadBand = std::function<std::optional<SourceBand>(const Window&)>;
+  /// Cuts one tile. heights [C x R] out, relative to the band's datum; NaN where void: outside the source, or where less
+  /// than half of the kernel's weight, or none of the nearest samples, is valid. False, and heights are left alone, where
+  /// the tile has no elevation.
+  virtual bool cut(TileIndex tile, const ReadBand& read, std::span<float> heights) const = 0;
+  /// The same from a band that holds all that the tile reads.
+  void cut_from(const SourceBand& band, TileIndex tile, std::span<float> heights) const;
 
  protected:
   TileResampler() = default;

@@ -54,6 +54,8 @@ class SourceSurvey {
 
   /// Samples of the source's type; every sample of the source once, in any order that suits.
   void add(std::span<const std::byte> raw);
+  /// So many samples without an elevation.
+  void add_voids(std::int64_t samples) { all_.voids += samples; }
   /// What another survey of the same source found in other parts.
   void add(const SourceSurvey& other);
 

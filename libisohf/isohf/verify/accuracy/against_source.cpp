@@ -18,7 +18,7 @@
 #include "isohf/lattice/barycentric.h"
 #include "isohf/restore/archive_geometry.h"
 #include "isohf/restore/rows/vertex_rows.h"
-#include "isohf/sampling/source/band_reader.h"
+#include "isohf/sampling/source/height_rows.h"
 #include "isohf/sampling/source/source_statistics.h"
 #include "isohf/surface.h"
 #include "isohf/verify.h"
@@ -41,6 +41,9 @@ constexpr std::int64_t kBlock = 32;
 /// Samples around one that are searched for voids, at most: next to a pole a triangle reaches over any number.
 constexpr std::int64_t kMostReach = 64;
 constexpr std::size_t kMostPeaks = 256;
+/// Of the source: in one read, and of the windows that are kept.
+constexpr std::uint64_t kReadBytes = std::uint64_t{8} << 20U;
+constexpr std::uint64_t kWindowsBytes = std::uint64_t{128} << 20U;
 /// Object coordinates this near to a vertex's are the vertex's: places are rounded, and next to a void it matters.
 constexpr double kOnVertex = 1e-7;
 
@@ -93,13 +96,14 @@ class Comparison {
   }
 
   AccuracyReport run(const Job& job) {
-    const Prefilter samples_as_they_are = Prefilter::make(Filter::kBilinear, {});
     const ScratchFolder scratch = choose_memory(job);
-    BandReader reader(source_, datum_, samples_as_they_are);
+    HeightRows rows(source_, datum_, false,
+                    warp_ ? CellStore::of_windows(info_, kWindowsBytes, job.scratch_folder)
+                          : CellStore::of_rows(info_, kReadBytes));
     AccuracyReport report;
     ErrorSums errors;
     std::int64_t first_row = 0;
-    if (warp_) run_warped(reader, report, errors, job);
+    if (warp_) run_warped(rows, report, errors, job);
     VertexRows tiles(grid_, archive_.metadata().quantisation, tiles_of(archive_), 0, grid_.tile_columns() - 1, scratch);
     for (std::int64_t tile_row = 0; !warp_ && tile_row < grid_.tile_rows() && first_row < info_.height; ++tile_row) {
       const std::int64_t end_row = rows_until(tile_row);
@@ -110,9 +114,11 @@ class Comparison {
       while (first_row < end_row) {
         job.throw_if_cancelled();
         const std::int64_t end = std::min(first_row + rows_at_once_, end_row);
-        const auto band = reader.read(
-            {std::max<std::int64_t>(first_row - 2 * reach_, 0), std::min(end + 2 * reach_, info_.height) - 1});
-        compare_rows(RowSurface{tiles, tile_row}, *band, first_row, end, report, errors);
+        const std::int64_t first = std::max<std::int64_t>(first_row - 2 * reach_, 0);
+        Band band;
+        rows.drop_before(first);
+        (void)rows.read({0, first, info_.width, std::min(end + 2 * reach_, info_.height) - first}, as_they_are_, band);
+        compare_rows(RowSurface{tiles, tile_row}, band, first_row, end, report, errors);
         first_row = end;
       }
       job.report({"compare", "rows", tile_row + 1, grid_.tile_rows()});
@@ -143,18 +149,13 @@ class Comparison {
   /// Where a row of tiles is kept. Throws Error{kOutOfMemory}.
   ScratchFolder choose_memory(const Job& job) {
     if (job.bound_bytes() == 0) return std::nullopt;
-    constexpr std::uint64_t kBufferBytes = std::uint64_t{8} << 20U;
     const auto width = static_cast<double>(info_.width);
     const double tiles = VertexRows::memory_bytes(grid_, 0.0);
-    // Of projected samples the rows under a row of tiles are many, and its tiles as doubles.
-    double rows = static_cast<double>(rows_at_once_ + 4 * reach_ + 4);
-    if (warp_) {
-      for (const SourceWarp::RowBounds& bounds : SourceWarp(grid_, warp_->place(), 0.0).reading_bounds(true))
-        rows =
-            std::max(rows, std::min(bounds.most - bounds.least + 2.0 * kMostReach, static_cast<double>(info_.height)));
-    }
+    // Of projected samples windows are kept, and the row's tiles as doubles.
+    const double rows = static_cast<double>(rows_at_once_ + 4 * reach_ + 4) * width * 10.0;
     const double bytes = reading_bytes(job, static_cast<double>(grid_.shape().stored_vertex_count())) +
-                         static_cast<double>(source_.buffer_bytes()) + 2.0 * kBufferBytes + rows * width * 10.0 +
+                         static_cast<double>(source_.buffer_bytes()) + 2.0 * kReadBytes +
+                         (warp_ ? static_cast<double>(kWindowsBytes) : rows) +
                          threads_of(job) * 8.0 * static_cast<double>(grid_.tile_columns() * grid_.shape().columns()) +
                          (warp_ ? 2.0 * tiles : 0.0);
     return scratch_for(job, bytes + tiles, bytes, "comparing");
@@ -173,7 +174,7 @@ class Comparison {
   }
 
   /// The source was projected: each sample has a place of its own, and is compared with the tile row that it lies on.
-  void run_warped(BandReader& reader, AccuracyReport& report, ErrorSums& errors, const Job& job) {
+  void run_warped(HeightRows& rows, AccuracyReport& report, ErrorSums& errors, const Job& job) {
     const std::vector<SourceWarp::RowBounds> all = SourceWarp(grid_, warp_->place(), 0.0).reading_bounds();
     visited_ = 0;
     for (std::int64_t tile_row = 0; tile_row < grid_.tile_rows(); ++tile_row) {
@@ -183,9 +184,8 @@ class Comparison {
       if (bounds.most >= 0.0 && bounds.least <= last) {
         const auto first_row = static_cast<std::int64_t>(std::max(std::floor(bounds.least), 0.0));
         const auto end_row = static_cast<std::int64_t>(std::min(std::ceil(bounds.most), last)) + 1;
-        const auto band = reader.read(
-            {std::max<std::int64_t>(first_row - kMostReach, 0), std::min(end_row + kMostReach, info_.height) - 1});
-        compare_rows(decode(tile_row), *band, first_row, end_row, report, errors);
+        rows.drop_before(first_row - kMostReach);
+        compare_rows(decode(tile_row), rows, first_row, end_row, report, errors);
       }
       job.report({"compare", "rows", tile_row + 1, grid_.tile_rows()});
     }
@@ -236,13 +236,13 @@ class Comparison {
     return interpolate(snapped(barycentric(grid_.shape(), at.point)), view);
   }
 
-  void compare_rows(const TileRowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,
+  void compare_rows(const TileRowSurface& surface, HeightRows& rows, std::int64_t first, std::int64_t end,
                     AccuracyReport& report, ErrorSums& errors) {
     std::vector<Sums> sums(static_cast<std::size_t>(end - first));
     oneapi::tbb::parallel_for(first / kBlock, (end + kBlock - 1) / kBlock, [&](std::int64_t block) {
       const std::int64_t from = std::max(first, block * kBlock);
       const std::int64_t to = std::min(end, (block + 1) * kBlock);
-      compare_warped_rows(surface, band, from, to, std::span(sums).subspan(static_cast<std::size_t>(from - first)));
+      compare_warped_rows(surface, rows, from, to, std::span(sums).subspan(static_cast<std::size_t>(from - first)));
     });
     add_up(sums, first, report, errors);
   }
@@ -290,7 +290,7 @@ class Comparison {
 
   void compare_sample(double stored, const Band& band, std::int64_t column, std::int64_t row, WorldPoint world,
                       Sums& sums, ErrorHistogram& histogram) const {
-    const float sample = band.view().heights(column, row - band.rows.first);
+    const float sample = band.view().heights(column - band.window.column, row - band.window.row);
     const bool is_void = std::isnan(sample);
     sums.counts.samples_void += is_void ? 1 : 0;
     if (is_void || std::isnan(stored)) {
@@ -304,12 +304,18 @@ class Comparison {
   }
 
   /// Those samples of rows [first, end), a block's rows at most, that lie on the surface's tile row.
-  void compare_warped_rows(const TileRowSurface& surface, const Band& band, std::int64_t first, std::int64_t end,
+  void compare_warped_rows(const TileRowSurface& surface, HeightRows& rows, std::int64_t first, std::int64_t end,
                            std::span<Sums> sums) {
     ErrorHistogram& histogram = histograms_.local();
+    Band band;
     for (std::int64_t column = 0; column < info_.width; column += kBlock) {
       const std::int64_t end_column = std::min(column + kBlock, info_.width);
       if (!may_meet(surface.tile_row, column, end_column, first, end)) continue;
+      const std::int64_t west = std::max<std::int64_t>(column - kMostReach, 0);
+      const std::int64_t north = std::max<std::int64_t>(first - kMostReach, 0);
+      const Window around{west, north, std::min(end_column + kMostReach, info_.width) - west,
+                          std::min(end + kMostReach, info_.height) - north};
+      (void)rows.read(around, as_they_are_, band);
       for (std::int64_t row = first; row < end; ++row) {
         Sums& of_row = sums[static_cast<std::size_t>(row - first)];
         for (std::int64_t c = column; c < end_column; ++c) {
@@ -385,9 +391,9 @@ class Comparison {
         std::min((void_in_source ? 2 : 1) * reach_at(column, row), warp_ ? kMostReach : 2 * reach_);
     for (std::int64_t r = row - reach; r <= row + reach; ++r) {
       for (std::int64_t c = column - reach; c <= column + reach; ++c) {
-        const bool inside = c >= 0 && r >= band.rows.first && c < info_.width && r <= band.rows.last;
+        const bool inside = c >= 0 && r >= 0 && c < info_.width && r < info_.height;
         if (!inside && !edge_is_void) continue;
-        const bool is_void = !inside || std::isnan(band.view().heights(c, r - band.rows.first));
+        const bool is_void = !inside || std::isnan(band.view().heights(c - band.window.column, r - band.window.row));
         if (is_void != void_in_source) return;
       }
     }
@@ -400,6 +406,7 @@ class Comparison {
   HeightSource& source_;
   const SourceInfo& info_;
   const bool is_cut_;
+  const Prefilter as_they_are_ = Prefilter::make(Filter::kBilinear, {});
   double datum_ = 0.0;
   double span_ = 0.0;
   std::int64_t reach_ = 2;

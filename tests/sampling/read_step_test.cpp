@@ -1,13 +1,10 @@
-#include "isohf/sampling/source/source_rows.h"
+#include "isohf/sampling/source/read_step.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstring>
 #include <map>
-
-#include "isohf/error.h"
-#include "support/error_of.h"
 
 namespace isohf {
 namespace {
@@ -78,59 +75,6 @@ TEST(ReadStep, WindowsAreWholeBlocksAndCoverARasterOnce) {
       EXPECT_LE(source.largest, step.most_bytes(source.info()));
     }
   }
-}
-
-TEST(SourceRows, MemoryAndScratchFileGiveTheSamplesAndReadEachOnce) {
-  const std::string folder = testing::TempDir();
-  const std::vector<RowRange> ranges = {{0, 12}, {0, 12}, {10, 30}, {29, 55}, {55, 55}, {55, 88}, {80, 99}};
-  for (const bool in_scratch : {false, true}) {
-    for (const auto& [block_width, block_height] :
-         {std::pair<std::int64_t, std::int64_t>{70, 1}, {70, 8}, {16, 16}, {32, 64}}) {
-      BlockSource source(70, 100, block_width, block_height);
-      const ReadStep step = ReadStep::make(source.info(), 3000);
-      SourceRows rows =
-          in_scratch ? SourceRows(source, step, folder, SourceRows::kept_rows_for(step, 60)) : SourceRows(source, step);
-      std::shared_ptr<const RawRows> before;
-      RowRange range_before{0, -1};
-      for (const RowRange& range : ranges) {
-        const std::shared_ptr<const RawRows> held = rows.rows(range);
-        std::vector<std::byte> buffer;
-        const auto expect_samples = [&](const RawRows& kept, const RowRange& in) {
-          for (std::int64_t r = in.first; r <= in.last; ++r) {
-            const std::span<const std::byte> part = kept.part(r, 3, 61, buffer);
-            ASSERT_EQ(part.size(), 122U);
-            for (std::int64_t c = 0; c < 61; ++c) {
-              std::uint16_t value = 0;
-              std::memcpy(&value, part.data() + 2 * c, 2);
-              ASSERT_EQ(value, BlockSource::sample(c + 3, r)) << c << " " << r;
-            }
-          }
-        };
-        expect_samples(*held, range);
-        // The range before stays readable: its tiles may still be on their way.
-        if (before) expect_samples(*before, range_before);
-        before = held;
-        range_before = range;
-      }
-      EXPECT_EQ(source.reads.size(), 7000U);
-      for (const auto& [place, count] : source.reads) ASSERT_EQ(count, 1) << place.first << " " << place.second;
-    }
-  }
-}
-
-TEST(SourceRows, ARunThatBeginsInTheMiddleReadsNothingBefore) {
-  BlockSource source(70, 100, 70, 8);
-  SourceRows rows(source, ReadStep::make(source.info(), 2000));
-  (void)rows.rows({50, 60});
-  EXPECT_EQ(std::min_element(source.reads.begin(), source.reads.end())->first.second, 48);
-}
-
-TEST(SourceRows, AFolderThatIsNotThereIsNamed) {
-  BlockSource source(70, 100, 70, 8);
-  const std::string folder = testing::TempDir() + "/isohf-no-such-folder";
-  const Error error = test::error_of([&] { SourceRows(source, ReadStep::make(source.info(), 2000), folder, 60); });
-  EXPECT_EQ(error.code(), ErrorCode::kIo);
-  EXPECT_NE(std::string(error.what()).find(folder + ": cannot make a scratch file"), std::string::npos) << error.what();
 }
 
 }  // namespace
