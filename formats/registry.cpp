@@ -226,8 +226,7 @@ class UnchangedSource final : public HeightSource {
     for (std::size_t i = 0; i < count; ++i) beyond |= static_cast<int>(is_beyond(at(i)));
     for (std::size_t i = 0; beyond != 0 && i < count; ++i) {
       const double value = double{at(i)};
-      if (!is_beyond(at(i)) || value < info_.valid_min || value > info_.valid_max) continue;
-      if (std::ranges::find(info_.void_values, value) != info_.void_values.end()) continue;
+      if (!is_beyond(at(i)) || info_.is_nodata(value)) continue;
       throw Error(ErrorCode::kCorrupt, {info_.path, fmt::format("an elevation of {:.9g}", value),
                                         fmt::format("{} at most either way", kBeyondAnyGround),
                                         void_values_with(info_, {value}) + " takes it as nodata"});

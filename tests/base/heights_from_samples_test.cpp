@@ -37,6 +37,7 @@ std::vector<std::byte> make_samples(SampleType type, std::size_t count, const st
 float height_of(const SourceInfo& info, double datum, double raw) {
   bool is_void = !std::isfinite(raw) || raw < info.valid_min || raw > info.valid_max;
   for (const double value : info.void_values) is_void = is_void || raw == value;
+  EXPECT_EQ(info.is_nodata(raw), is_void) << raw;
   const double offset = info.z_offset - datum;
   const auto height = static_cast<float>(info.z_scale == 1.0 && offset == 0.0 ? raw : raw * info.z_scale + offset);
   return is_void || !std::isfinite(height) ? std::numeric_limits<float>::quiet_NaN() : height;

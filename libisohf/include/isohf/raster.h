@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -104,6 +106,12 @@ struct SourceInfo {
   std::int64_t block_width = 0;
   std::int64_t block_height = 1;
   std::vector<Warning> warnings;  ///< for the user; e.g. "values look like 0...1"
+
+  /// Whether a raw value means "no elevation".
+  [[nodiscard]] bool is_nodata(double raw) const {
+    return !std::isfinite(raw) || raw < valid_min || raw > valid_max ||
+           std::find(void_values.begin(), void_values.end(), raw) != void_values.end();
+  }
 };
 
 /// A rectangle of source samples, column before row; inside the raster.

@@ -46,10 +46,8 @@ void elevations_from(const SourceInfo& info, std::span<const std::byte> raw, std
       T value;
       std::memcpy(&value, raw.data() + i * bytes, sizeof value);
       const auto number = static_cast<double>(value);
-      const bool is_void =
-          !std::isfinite(number) || number < info.valid_min || number > info.valid_max ||
-          std::find(info.void_values.begin(), info.void_values.end(), number) != info.void_values.end();
-      out[i] = is_void ? std::numeric_limits<double>::quiet_NaN() : number * info.z_scale + info.z_offset;
+      out[i] =
+          info.is_nodata(number) ? std::numeric_limits<double>::quiet_NaN() : number * info.z_scale + info.z_offset;
     }
   };
   switch (info.sample_type) {

@@ -293,10 +293,7 @@ std::vector<std::int64_t> VoidFiller::fill(const ReadVoidRows& read, std::int64_
 /// The nearest number that the sample type holds and that means an elevation.
 double VoidFiller::storable(double raw) const {
   const double nearest = nearest_sample(info_.sample_type, raw);
-  const auto is_valid = [&](double value) {
-    return value >= info_.valid_min && value <= info_.valid_max &&
-           std::find(info_.void_values.begin(), info_.void_values.end(), value) == info_.void_values.end();
-  };
+  const auto is_valid = [&](double value) { return !info_.is_nodata(value); };
   double up = nearest;
   double down = nearest;
   // Every step leaves one void value behind; the elevations that it was made of lie on both sides.
