@@ -52,17 +52,10 @@ struct TileJob {
   CodeSource::Part part;
   EncodedTile encoded;
   Outliers outliers;
-  PlaneSample planes;
-  SeedStage::Tile seeds;
-  TextureStage::Encoded texture;
+  std::vector<std::unique_ptr<Stage::Made>> made;  ///< by stage
 };
 
-/// What goes into an archive beside the tiles, made in the same pass; nullptr: not asked for.
-struct Stages {
-  PlaneStage* planes = nullptr;
-  SeedStage* seeds = nullptr;
-  const TextureStage* textures = nullptr;
-};
+using Stages = std::vector<std::unique_ptr<Stage>>;
 
 Outliers find_outliers(const CountedVertices& counted, TileIndex tile, const CodeLimits& limits, double datum,
                        std::span<const float> heights) {
@@ -111,95 +104,114 @@ struct VoidTile {
         encoded(encode_tile(conversion.plan.grid.shape(), codes, conversion.options.effort)) {}
 };
 
-void make_tile(const Conversion& conversion, CodeSource& source, const CountedVertices& counted,
-               const VoidTile& nothing, const Stages& stages, bool is_new, TileJob& tile) {
-  const TileShape& shape = conversion.plan.grid.shape();
-  std::vector<float> heights;
-  TileCodes codes;
-  const std::optional<QuantiserCounts> counts = source.cut(tile.index, tile.part, heights, codes);
-  if (!counts) {
-    tile.encoded = nothing.encoded;
-    tile.encoded.statistics = void_statistics(counted, tile.index);
-    if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(tile.index, nothing.codes);
-    tile.seeds.is_empty = true;
-    return;
+/// Second pass over the source: read -> resample and encode -> write in order. The number of tiles in flight is fixed.
+class TilePass {
+ public:
+  TilePass(const Conversion& conversion, ArchiveWriter& writer, const Stages& stages)
+      : conversion_(conversion),
+        writer_(writer),
+        stages_(stages),
+        source_(conversion),
+        counted_(describe_job(conversion.source.info(), conversion.plan, conversion.options, conversion.quantisation)),
+        nothing_(conversion),
+        first_new_(writer.next_tile()) {
+    for (const auto& stage : stages) first_.push_back(std::max(stage->first_tile(first_new_), conversion.first_tile));
   }
-  // Without a range from the user the codes reach over all that there is.
-  if (conversion.options.z_range || counts->below + counts->above > 0) {
-    tile.outliers = find_outliers(counted, tile.index, conversion.limits, conversion.datum, heights);
-  }
-  EncodedTile& encoded = tile.encoded;
-  encoded = encode_tile(shape, codes, conversion.options.effort);
-  encoded.statistics = tile_statistics(counted, tile.index, codes, conversion.quantisation);
-  encoded.statistics.clamped = tile.outliers.counted;
-  encoded.statistics.worst_rounding = counts->worst_rounding;
-  if (stages.planes != nullptr && is_new) tile.planes = stages.planes->sample(codes, encoded);
-  if (stages.seeds != nullptr) tile.seeds = stages.seeds->prepare(tile.index, codes);
-  tile.seeds.is_empty = encoded.is_empty;
-  if (stages.textures != nullptr && is_new && !encoded.is_empty) tile.texture = stages.textures->encode(tile.index);
-}
 
-/// Second pass: read -> resample and encode -> write in order. The number of tiles in flight is fixed.
-void write_tiles(const Conversion& conversion, ArchiveWriter& writer, const Stages& stages) {
-  const TileGrid& grid = conversion.plan.grid;
-  CodeSource source(conversion);
-  const CountedVertices counted(
-      describe_job(conversion.source.info(), conversion.plan, conversion.options, conversion.quantisation));
-  const VoidTile nothing(conversion);
-  const std::int64_t first_new = writer.next_tile();
-  std::int64_t next = stages.seeds != nullptr
-                          ? std::max(SeedStage::first_tile_needed(grid, first_new), conversion.first_tile)
-                          : first_new;
-
-  // Tiles leave the pipeline in the order in which they enter it, so that a ring of as many as may be in flight always
-  // has the next one free. The pipeline itself only hands on pointers: it forgets to destroy what it holds when a stage
-  // throws.
-  std::vector<TileJob> ring(conversion.memory.tiles_in_flight);
-  std::size_t entered = 0;
-
-  const auto read = [&](oneapi::tbb::flow_control& control) -> TileJob* {
-    conversion.job.throw_if_cancelled();
-    if (next == conversion.end_tile) {
-      control.stop();
-      return nullptr;
+  void run() {
+    const TileGrid& grid = conversion_.plan.grid;
+    // Tiles leave the pipeline in the order in which they enter it, so that a ring of as many as may be in flight always
+    // has the next one free. The pipeline itself only hands on pointers: it forgets to destroy what it holds when a stage
+    // throws.
+    std::vector<TileJob> ring(conversion_.memory.tiles_in_flight);
+    std::size_t entered = 0;
+    std::int64_t next = first_new_;
+    for (const std::int64_t first : first_) next = std::min(next, first);
+    const auto read = [&](oneapi::tbb::flow_control& control) -> TileJob* {
+      conversion_.job.throw_if_cancelled();
+      if (next == conversion_.end_tile) {
+        control.stop();
+        return nullptr;
+      }
+      TileJob* tile = &ring[entered++ % ring.size()];
+      *tile = {};
+      tile->index = grid.tile_at(next++);
+      tile->part = source_.read(tile->index);
+      return tile;
+    };
+    const auto encode = [&](TileJob* tile) {
+      make(*tile);
+      tile->part = {};
+      return tile;
+    };
+    using oneapi::tbb::filter_mode;
+    using oneapi::tbb::make_filter;
+    oneapi::tbb::parallel_pipeline(ring.size(), make_filter<void, TileJob*>(filter_mode::serial_in_order, read) &
+                                                    make_filter<TileJob*, TileJob*>(filter_mode::parallel, encode) &
+                                                    make_filter<TileJob*, void>(filter_mode::serial_in_order,
+                                                                                [&](TileJob* tile) { write(*tile); }));
+    for (std::int64_t flat = conversion_.end_tile; flat < grid.tile_count(); ++flat) {
+      for (const auto& stage : stages_) stage->pass_over(grid.tile_at(flat));
     }
-    TileJob* tile = &ring[entered++ % ring.size()];
-    *tile = {};
-    tile->index = grid.tile_at(next++);
-    tile->part = source.read(tile->index);
-    return tile;
-  };
-  const auto encode = [&](TileJob* tile) {
-    make_tile(conversion, source, counted, nothing, stages, grid.flat_index(tile->index) >= first_new, *tile);
-    tile->part = {};
-    return tile;
-  };
-  std::int64_t written = next;
-  const auto write = [&](TileJob* tile) {
-    if (tile->outliers.vertices > 0 && !conversion.options.clamp_range)
-      refuse_outliers(conversion, tile->index, tile->outliers);
-    if (written >= first_new) {
-      if (stages.textures != nullptr) stages.textures->add(tile->index, tile->texture, writer);
-      writer.add_tile(tile->encoded);
-      if (stages.planes != nullptr) stages.planes->add(tile->planes);
-    }
-    if (stages.seeds != nullptr) stages.seeds->add(tile->index, tile->seeds, writer);
-    ++written;
-    conversion.job.report({"tiles", "tiles", written - conversion.first_tile,
-                           conversion.end_tile - conversion.first_tile, writer.bytes_written()});
-  };
-
-  using oneapi::tbb::filter_mode;
-  using oneapi::tbb::make_filter;
-  oneapi::tbb::parallel_pipeline(ring.size(), make_filter<void, TileJob*>(filter_mode::serial_in_order, read) &
-                                                  make_filter<TileJob*, TileJob*>(filter_mode::parallel, encode) &
-                                                  make_filter<TileJob*, void>(filter_mode::serial_in_order, write));
-  // Of a shard: what lies behind it.
-  for (std::int64_t flat = conversion.end_tile; flat < grid.tile_count() && stages.planes != nullptr; ++flat) {
-    stages.planes->add_outside(grid.tile_at(flat));
+    writer_.skip_tiles(grid.tile_count() - conversion_.end_tile);
   }
-  writer.skip_tiles(grid.tile_count() - conversion.end_tile);
-}
+
+ private:
+  /// Any thread.
+  void make(TileJob& tile) {
+    std::vector<float> heights;
+    TileCodes codes;
+    const std::optional<QuantiserCounts> counts = source_.cut(tile.index, tile.part, heights, codes);
+    if (!counts) {
+      tile.encoded = nothing_.encoded;
+      tile.encoded.statistics = void_statistics(counted_, tile.index);
+      return make_beside(nothing_.codes, tile);
+    }
+    // Without a range from the user the codes reach over all that there is.
+    if (conversion_.options.z_range || counts->below + counts->above > 0) {
+      tile.outliers = find_outliers(counted_, tile.index, conversion_.limits, conversion_.datum, heights);
+    }
+    EncodedTile& encoded = tile.encoded;
+    encoded = encode_tile(conversion_.plan.grid.shape(), codes, conversion_.options.effort);
+    encoded.statistics = tile_statistics(counted_, tile.index, codes, conversion_.quantisation);
+    encoded.statistics.clamped = tile.outliers.counted;
+    encoded.statistics.worst_rounding = counts->worst_rounding;
+    make_beside(codes, tile);
+  }
+
+  void make_beside(const TileCodes& codes, TileJob& tile) const {
+    const std::int64_t flat = conversion_.plan.grid.flat_index(tile.index);
+    for (std::size_t i = 0; i < stages_.size(); ++i) {
+      tile.made.push_back(flat < first_[i] ? nullptr : stages_[i]->make(tile.index, codes, tile.encoded));
+    }
+  }
+
+  /// In flat order.
+  void write(const TileJob& tile) {
+    if (tile.outliers.vertices > 0 && !conversion_.options.clamp_range)
+      refuse_outliers(conversion_, tile.index, tile.outliers);
+    const std::int64_t flat = conversion_.plan.grid.flat_index(tile.index);
+    const auto hand_on = [&](auto add) {
+      for (std::size_t i = 0; i < stages_.size(); ++i) {
+        if (flat >= first_[i]) ((*stages_[i]).*add)(tile.index, tile.made[i].get(), writer_);
+      }
+    };
+    hand_on(&Stage::add_before);
+    if (flat >= first_new_) writer_.add_tile(tile.encoded);
+    hand_on(&Stage::add_after);
+    conversion_.job.report({"tiles", "tiles", flat + 1 - conversion_.first_tile,
+                            conversion_.end_tile - conversion_.first_tile, writer_.bytes_written()});
+  }
+
+  const Conversion& conversion_;
+  ArchiveWriter& writer_;
+  const Stages& stages_;
+  CodeSource source_;
+  const CountedVertices counted_;
+  const VoidTile nothing_;
+  const std::int64_t first_new_;     ///< flat index of the first tile that the writer has not
+  std::vector<std::int64_t> first_;  ///< and of each stage
+};
 
 /// Rows of tiles on either side of a shard, for its coarse planes and its residuals: what is needed as a rule.
 std::int64_t rows_around(const ConvertOptions& options, const ShardWork& shard) {
@@ -302,6 +314,106 @@ AccuracyInfo info_of(const AccuracyReport& report, const ConvertOptions& options
   return {report.samples_compared, report.samples_lost, report.rms, report.max, options.max_error, rounding};
 }
 
+/// Throws for what neither plan nor memory can make possible.
+void check_source(HeightSource& source, const Plan& plan, const ConvertOptions& options) {
+  const SourceInfo& info = source.info();
+  if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, info, plan);
+  if (!options.lossless || info.fill_distance == 0 || &source.as_stored() != &source) return;
+  throw Error(ErrorCode::kInvalidArgument,
+              fmt::format("{}: `lossless` keeps the samples as they were before `fill`, which are out of reach; leave "
+                          "one of the two out",
+                          info.path));
+}
+
+WriterOptions writer_options(const Conversion& conversion, const ShardWork* shard) {
+  const ConvertOptions& options = conversion.options;
+  WriterOptions how{options.overwrite, options.resume,
+                    job_fingerprint(conversion.source.info(), conversion.plan, options),
+                    options.planes ? planes_for(conversion.plan.grid) : PlaneInfo(), conversion.first_tile};
+  if (shard != nullptr)
+    how.job_fingerprint += fmt::format(" | shard {} of {}", shard->record.number, shard->record.count);
+  return how;
+}
+
+/// In the order in which they take a tile. `around`  is made here for a shard, and outlives them.
+Stages make_stages(const Conversion& conversion, const ShardWork* shard, std::unique_ptr<TextureStage> textures,
+                   std::optional<TilesAround>& around, ArchiveWriter& writer) {
+  const ConvertOptions& options = conversion.options;
+  const Plan& plan = conversion.plan;
+  const MemoryPlan& memory = conversion.memory;
+  const auto scratch = [&](bool is_used) {
+    return is_used ? ScratchFolder(conversion.job.scratch_folder) : std::nullopt;
+  };
+  const RowRange rows = shard != nullptr ? RowRange{shard->record.first_row, shard->record.end_row - 1}
+                                         : RowRange{0, plan.grid.tile_rows() - 1};
+  std::unique_ptr<ResidualStage> residuals;
+  if (options.lossless) residuals = std::make_unique<ResidualStage>(conversion, rows);
+  if (shard != nullptr) around.emplace(make_around(conversion, *shard, residuals.get()));
+  if (residuals && around) residuals->set_around(*around);
+  Stages stages;
+  if (textures) stages.push_back(std::move(textures));
+  if (const PlaneInfo coarse = options.planes ? planes_for(plan.grid) : PlaneInfo(); coarse.count > 0) {
+    stages.push_back(std::make_unique<PlaneStage>(Planes(plan.grid, coarse.stride, coarse.count, plan.frame.wraps_x),
+                                                  conversion.quantisation, options.effort, writer, rows,
+                                                  around ? &*around : nullptr, scratch(memory.planes_in_scratch)));
+  }
+  if (options.shadow_seeds) {
+    // Lengths of both kinds are compared as metres where both are known to be.
+    const SourceInfo& info = conversion.source.info();
+    const bool known = plan.frame.in_metres && !info.vertical_unit.empty();
+    stages.push_back(std::make_unique<SeedStage>(
+        plan.grid, plan.frame.bounds(), conversion.quantisation, *options.shadow_seeds,
+        known ? 1.0 / info.metres_per_vertical_unit : 1.0, scratch(memory.seeds_in_scratch)));
+  }
+  if (residuals) stages.push_back(std::move(residuals));
+  return stages;
+}
+
+/// Metadata and summary of a conversion whose members are all written.
+void describe(const Conversion& conversion, const ShardWork* shard, const Stages& stages, const ArchiveWriter& writer,
+              ConvertSummary& summary) {
+  const TileGrid& grid = conversion.plan.grid;
+  const SourceInfo& info = conversion.source.info();
+  Metadata& metadata = summary.metadata;
+  metadata = describe_job(info, conversion.plan, conversion.options, conversion.quantisation);
+  metadata.statistics = total_statistics(writer.statistics());
+  if (conversion.most_off() > 0.0) metadata.rounding = conversion.most_off();
+  for (const auto& stage : stages) stage->describe(writer, metadata, summary);
+  if (shard != nullptr) {
+    ShardRecord record = shard->record;
+    std::vector<double> sums = writer.row_sums();
+    sums.resize(static_cast<std::size_t>(record.end_row));
+    record.row_sums.assign(sums.begin() + static_cast<std::ptrdiff_t>(record.first_row), sums.end());
+    metadata.extensions.emplace_back(kShardName, format_shard_record(record));
+  }
+  ISOHF_ASSERT(writer.next_tile() == grid.tile_count());
+  metadata.tiles_stored = writer.tiles_stored();
+  summary.tiles_expected = summary.tiles_written = conversion.end_tile - conversion.first_tile;
+  summary.tiles_void = summary.tiles_written - writer.tiles_stored();
+  summary.tile_bytes = writer.tile_bytes();
+  summary.plane_bytes = writer.members_in("planes/").bytes;
+  summary.source_samples = static_cast<std::uint64_t>(info.width) * static_cast<std::uint64_t>(info.height);
+  summary.lattice_samples = static_cast<std::uint64_t>(conversion.plan.lattice_samples);
+  summary.step = metadata.quantisation.type == CodeType::kF32 ? 0.0 : metadata.quantisation.scale;
+  summary.worst_rounding = metadata.statistics.worst_rounding;
+}
+
+/// Measures an archive whose error has a bound: whether it stays within it, and then says so in the metadata.
+bool is_within_bound(const Conversion& conversion, ArchiveWriter& writer, ConversionResult& result) {
+  const ConvertOptions& options = conversion.options;
+  if (!options.max_error) return true;
+  Metadata& metadata = result.summary.metadata;
+  writer.complete(metadata);
+  result.measured = measure(writer.part(), conversion);
+  const AccuracyInfo found =
+      info_of(*result.measured, options,
+              options.code_type == CodeType::kF32 ? metadata.statistics.worst_rounding
+                                                  : metadata.rounding.value_or(0.5 * metadata.quantisation.scale));
+  if (found.max > *options.max_error) return false;
+  metadata.extensions.emplace_back(kAccuracyName, format_accuracy_info(found));
+  return true;
+}
+
 }  // namespace
 
 Plan plan_conversion(const SourceInfo& info, const ConvertOptions& options) {
@@ -337,132 +449,44 @@ ShardRange find_shard_range(HeightSource& source, const ConvertOptions& options,
 ConversionResult run_conversion(HeightSource& source, const Plan& plan, const std::string& output,
                                 const ConvertOptions& options, const Job& job, bool is_retry, const ShardWork* shard) {
   const auto start = std::chrono::steady_clock::now();
-  const SourceInfo& info = source.info();
-  if (options.shadow_seeds) check_seed_request(*options.shadow_seeds, info, plan);
-  std::optional<TextureStage> textures;
+  check_source(source, plan, options);
+  std::unique_ptr<TextureStage> textures;
   if (options.texture) {
-    textures.emplace(TextureStage::make(plan, info, *options.texture, threads_of(job), textured_tiles_in_flight(job)));
+    textures = std::make_unique<TextureStage>(
+        TextureStage::make(plan, source.info(), *options.texture, threads_of(job), textured_tiles_in_flight(job)));
   }
-  const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));
-  Prefilter prefilter = Prefilter::make(kernel.filter(), options.acquisition);
-  const PlaneInfo coarse = options.planes ? planes_for(plan.grid) : PlaneInfo();
   const std::int64_t beside = shard != nullptr ? 2 * rows_around(options, *shard) : 0;
   const MemoryPlan memory =
       plan_memory(source, plan, options, job,
                   (textures ? textures->memory_bytes() : 0) + TilesAround::memory_bytes(plan.grid, beside));
   check_memory(source, memory, job);
-  if (options.lossless && info.fill_distance > 0 && &source.as_stored() == &source) {
-    throw Error(ErrorCode::kInvalidArgument,
-                fmt::format("{}: `lossless` keeps the samples as they were before `fill`, which are out of reach; "
-                            "leave one of the two out",
-                            info.path));
-  }
   ConversionResult result{ConvertSummary(plan.grid), {}};
   ConvertSummary& summary = result.summary;
-  Metadata& metadata = summary.metadata;
-  warn_of_plan(info, plan, options.plan, textures ? &*textures : nullptr, summary.warnings);
+  warn_of_plan(source.info(), plan, options.plan, textures.get(), summary.warnings);
   refuse_warnings(summary, options);
-  Conversion conversion{source, options, plan, memory, kernel, std::move(prefilter), job};
-  WriterOptions how{options.overwrite, options.resume, job_fingerprint(info, plan, options), coarse};
+  const Kernel kernel = Kernel::make(options.filter.value_or(kDefaultFilter));
+  Conversion conversion{source, options, plan, memory, kernel, Prefilter::make(kernel.filter(), options.acquisition),
+                        job};
   if (shard != nullptr) {
-    conversion.first_tile = how.first_tile = shard->record.first_row * plan.grid.tile_columns();
+    conversion.first_tile = shard->record.first_row * plan.grid.tile_columns();
     conversion.end_tile = shard->record.end_row * plan.grid.tile_columns();
-    how.job_fingerprint += fmt::format(" | shard {} of {}", shard->record.number, shard->record.count);
   }
-  ArchiveWriter writer(output, plan.grid, how);
-  std::optional<PlaneStage> planes;
-  std::optional<SeedStage> seeds;
-  std::optional<ResidualStage> residuals;
-  std::optional<TilesAround> around;
-  std::optional<LosslessRecord> lossless;
+  ArchiveWriter writer(output, plan.grid, writer_options(conversion, shard));
   try {
+    std::optional<TilesAround> around;
+    Stages stages;
     Arena(job).execute([&] {
       choose_codes(conversion, summary);
       refuse_warnings(summary, options);
-      if (options.shadow_seeds) {
-        // Lengths of both kinds are compared as metres where both are known to be.
-        const bool known = plan.frame.in_metres && !info.vertical_unit.empty();
-        seeds.emplace(plan.grid, plan.frame.bounds(), conversion.quantisation, *options.shadow_seeds,
-                      known ? 1.0 / info.metres_per_vertical_unit : 1.0,
-                      memory.seeds_in_scratch ? ScratchFolder(job.scratch_folder) : std::nullopt);
-      }
-      const RowRange rows = shard != nullptr ? RowRange{shard->record.first_row, shard->record.end_row - 1}
-                                             : RowRange{0, plan.grid.tile_rows() - 1};
-      if (options.lossless) {
-        residuals.emplace(source.as_stored(), plan.frame, plan.grid, conversion.quantisation, conversion.largest, rows,
-                          memory.residuals_in_scratch ? ScratchFolder(job.scratch_folder) : std::nullopt);
-      }
-      if (shard != nullptr) {
-        around.emplace(make_around(conversion, *shard, residuals ? &*residuals : nullptr));
-      }
-      if (coarse.count > 0) {
-        planes.emplace(Planes(plan.grid, coarse.stride, coarse.count, plan.frame.wraps_x), conversion.quantisation,
-                       options.effort, writer, rows, around ? &*around : nullptr,
-                       memory.planes_in_scratch ? ScratchFolder(job.scratch_folder) : std::nullopt);
-      }
-      write_tiles(conversion, writer,
-                  {planes ? &*planes : nullptr, seeds ? &*seeds : nullptr, textures ? &*textures : nullptr});
-      if (residuals) {
-        writer.flush_tiles();
-        planes.reset();
-        if (memory.residuals_in_scratch) give_back_freed_memory();
-        const auto read_tile = [&](TileIndex tile) {
-          const bool is_beside = around && around->holds(tile);
-          ISOHF_ASSERT(is_beside || shard == nullptr || (tile.row >= rows.first && tile.row <= rows.last));
-          return is_beside ? around->codes(tile) : writer.read_tile(tile, conversion.quantisation);
-        };
-        // A shard does not pass all samples.
-        const std::optional<std::string> samples_sha256 =
-            shard != nullptr ? std::optional(hash_of_samples(source.as_stored(), job)) : std::nullopt;
-        lossless = residuals->write(read_tile, memory.members_at_once, samples_sha256, writer, job);
-      }
+      stages = make_stages(conversion, shard, std::move(textures), around, writer);
+      TilePass(conversion, writer, stages).run();
+      for (const auto& stage : stages) stage->finish(writer, job);
     });
-
-    const TileStatistics all = writer.statistics();
-    check_statistics(conversion, all, shard != nullptr, summary.warnings);
+    check_statistics(conversion, writer.statistics(), shard != nullptr, summary.warnings);
     refuse_warnings(summary, options);
-    metadata = describe_job(info, plan, options, conversion.quantisation);
-    metadata.statistics = total_statistics(all);
-    if (conversion.most_off() > 0.0) metadata.rounding = conversion.most_off();
-    summary.plane_bytes = writer.members_in("planes/").bytes;
-    if (seeds) {
-      const ShadowSeedInfo record = seeds->info(writer);
-      summary.seed_bytes = record.bytes;
-      metadata.extensions.emplace_back(kShadowSeedsName, format_shadow_seed_info(record));
-    }
-    if (textures) {
-      const TextureInfo record = textures->info(writer);
-      summary.texture_bytes = record.bytes;
-      summary.pixels_per_texel = textures->pixels_per_texel();
-      metadata.textures = {texture_name_pattern(record.format)};
-      metadata.extensions.emplace_back(kTileTexturesName, format_texture_info(record));
-    }
-    if (lossless) {
-      summary.residual_bytes = lossless->residual_bytes;
-      metadata.extensions.emplace_back(kLosslessName, format_lossless(*lossless));
-    }
-    if (shard != nullptr) {
-      ShardRecord record = shard->record;
-      std::vector<double> sums = writer.row_sums();
-      sums.resize(static_cast<std::size_t>(record.end_row));
-      record.row_sums.assign(sums.begin() + static_cast<std::ptrdiff_t>(record.first_row), sums.end());
-      metadata.extensions.emplace_back(kShardName, format_shard_record(record));
-    }
-    ISOHF_ASSERT(writer.next_tile() == plan.grid.tile_count());
-    summary.tiles_expected = summary.tiles_written = conversion.end_tile - conversion.first_tile;
-    summary.tiles_void = summary.tiles_written - writer.tiles_stored();
-    summary.tile_bytes = writer.tile_bytes();
-    if (options.max_error) {
-      writer.complete(metadata);
-      result.measured = measure(writer.part(), conversion);
-      const AccuracyInfo found =
-          info_of(*result.measured, options,
-                  options.code_type == CodeType::kF32 ? all.worst_rounding
-                                                      : metadata.rounding.value_or(0.5 * metadata.quantisation.scale));
-      result.is_finished = found.max <= *options.max_error;
-      if (result.is_finished) metadata.extensions.emplace_back(kAccuracyName, format_accuracy_info(found));
-    }
-    summary.archive_bytes = result.is_finished ? writer.finish(metadata) : writer.bytes_written();
+    describe(conversion, shard, stages, writer, summary);
+    result.is_finished = is_within_bound(conversion, writer, result);
+    summary.archive_bytes = result.is_finished ? writer.finish(summary.metadata) : writer.bytes_written();
   } catch (const Error& error) {
     if (is_retry) throw;
     // What is done stays for a resume when the user or the system ended it.
@@ -471,11 +495,6 @@ ConversionResult run_conversion(HeightSource& source, const Plan& plan, const st
     throw Error(ErrorCode::kIo,
                 fmt::format("{}; {}.part keeps what is done, `resume` goes on from there", error.what(), output));
   }
-  metadata.tiles_stored = writer.tiles_stored();
-  summary.source_samples = static_cast<std::uint64_t>(info.width) * static_cast<std::uint64_t>(info.height);
-  summary.lattice_samples = static_cast<std::uint64_t>(plan.lattice_samples);
-  summary.step = metadata.quantisation.type == CodeType::kF32 ? 0.0 : metadata.quantisation.scale;
-  summary.worst_rounding = metadata.statistics.worst_rounding;
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
 }

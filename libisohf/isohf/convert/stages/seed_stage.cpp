@@ -48,23 +48,26 @@ std::int64_t SeedStage::first_tile_needed(const TileGrid& grid, std::int64_t nex
   return next_tile == 0 ? 0 : (next_tile - 1) / grid.tile_columns() * grid.tile_columns();
 }
 
-void SeedStage::add(TileIndex index, const Tile& tile, ArchiveWriter& writer) {
-  ISOHF_ASSERT(static_cast<std::int64_t>(tiles_.count()) == index.column);
-  tiles_.add(tile);
-  if (static_cast<std::int64_t>(tiles_.count()) == grid_.tile_columns()) finish_row(index.row, writer);
+std::unique_ptr<Stage::Made> SeedStage::make(TileIndex tile, const TileCodes& codes, const EncodedTile& encoded) const {
+  auto made = std::make_unique<MadeOf<SeedRow::Tile>>(row_.prepare(tile, codes));
+  made->value.is_empty = encoded.is_empty;
+  return made;
 }
 
-void SeedStage::finish_row(std::int64_t row, ArchiveWriter& writer) {
-  row_.write(tiles_, row, writer);
+void SeedStage::add_after(TileIndex tile, const Made* made, ArchiveWriter& writer) {
+  ISOHF_ASSERT(static_cast<std::int64_t>(tiles_.count()) == tile.column);
+  tiles_.add(static_cast<const MadeOf<SeedRow::Tile>*>(made)->value);
+  if (static_cast<std::int64_t>(tiles_.count()) < grid_.tile_columns()) return;
+  row_.write(tiles_, tile.row, writer);
   tiles_.clear();
 }
 
-ShadowSeedInfo SeedStage::info(const ArchiveWriter& writer) const {
+void SeedStage::describe(const ArchiveWriter& writer, Metadata& metadata, ConvertSummary& summary) const {
   ShadowSeedInfo info = info_;
   const MemberTotals totals = writer.members_in("seeds/");
   info.members = totals.members;
-  info.bytes = totals.bytes;
-  return info;
+  summary.seed_bytes = info.bytes = totals.bytes;
+  metadata.extensions.emplace_back(kShadowSeedsName, format_shadow_seed_info(info));
 }
 
 }  // namespace isohf

@@ -50,7 +50,7 @@ int choose_size(const TileGrid& grid, const PhotoFrame& frame, int most) {
   return size;
 }
 
-TextureInfo describe(const Plan& plan, const TextureRequest& request, const PhotoPlacement& placement) {
+TextureInfo texture_info(const Plan& plan, const TextureRequest& request, const PhotoPlacement& placement) {
   const PhotoInfo& photo = request.photo->info();
   TextureInfo info;
   info.format = request.format.value_or(photo.channels == 4 ? TextureFormat::kPng : TextureFormat::kJpeg);
@@ -158,7 +158,7 @@ TextureStage TextureStage::make(const Plan& plan, const SourceInfo& source, cons
                                 int tiles_at_once) {
   check(request, request.photo->info());
   PhotoPlacement placement = place_photo(request.photo->info(), source, plan.frame, request.same_system);
-  TextureInfo info = describe(plan, request, placement);
+  TextureInfo info = texture_info(plan, request, placement);
   // Beyond a photo of a part of the ground nothing is shown, which takes alpha: where JPEG is asked for, its border goes on.
   std::unique_ptr<PhotoSource> bordered;
   if (placement.is_part && request.format != TextureFormat::kJpeg) {
@@ -203,32 +203,36 @@ bool TextureStage::shows(TileIndex tile) const {
   return projected_->shows({tile.column * span + margin, tile.row * span + margin, info_.size, info_.size});
 }
 
-TextureStage::Encoded TextureStage::encode(TileIndex tile) const {
-  Encoded encoded;
-  if (!shows(tile)) return encoded;
+std::unique_ptr<Stage::Made> TextureStage::make(TileIndex tile, const TileCodes& /*codes*/,
+                                                const EncodedTile& encoded) const {
+  if (encoded.is_empty || !shows(tile)) return nullptr;
   std::vector<Picture> levels = cutter_.cut(photo_, tile);
   // A transparent border alone shows nothing.
-  if (bordered_ && std::none_of(levels.begin(), levels.end(), has_opacity)) return encoded;
+  if (bordered_ && std::none_of(levels.begin(), levels.end(), has_opacity)) return nullptr;
+  Encoded members;
   for (auto level = levels.rbegin(); level != levels.rend(); ++level) {
     if (level->channels > info_.channels) *level = without_alpha(*level);
-    encoded.push_back(info_.format == TextureFormat::kPng ? encode_png(*level) : encode_jpeg(*level, info_.quality));
+    members.push_back(info_.format == TextureFormat::kPng ? encode_png(*level) : encode_jpeg(*level, info_.quality));
   }
-  return encoded;
+  return std::make_unique<MadeOf<Encoded>>(std::move(members));
 }
 
-void TextureStage::add(TileIndex tile, const Encoded& encoded, ArchiveWriter& writer) const {
+void TextureStage::add_before(TileIndex tile, const Made* made, ArchiveWriter& writer) {
+  if (made == nullptr) return;
   int level = info_.levels;
-  for (const std::vector<std::byte>& member : encoded) {
+  for (const std::vector<std::byte>& member : static_cast<const MadeOf<Encoded>*>(made)->value) {
     writer.add_member(texture_name(info_, tile, --level), member, false);
   }
 }
 
-TextureInfo TextureStage::info(const ArchiveWriter& writer) const {
+void TextureStage::describe(const ArchiveWriter& writer, Metadata& metadata, ConvertSummary& summary) const {
   TextureInfo info = info_;
   const MemberTotals totals = writer.members_in(kTextureFolder);
   info.members = totals.members;
-  info.bytes = totals.bytes;
-  return info;
+  summary.texture_bytes = info.bytes = totals.bytes;
+  summary.pixels_per_texel = pixels_per_texel_;
+  metadata.textures = {texture_name_pattern(info.format)};
+  metadata.extensions.emplace_back(kTileTexturesName, format_texture_info(info));
 }
 
 }  // namespace isohf

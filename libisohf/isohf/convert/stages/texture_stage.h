@@ -10,6 +10,7 @@
 #include "isohf/archive/writer.h"
 #include "isohf/convert.h"
 #include "isohf/convert/frame/plan.h"
+#include "isohf/convert/stages/stage.h"
 #include "isohf/photo/projected_photo.h"
 #include "isohf/photo/texture_cutter.h"
 
@@ -20,7 +21,7 @@ inline constexpr int kTextureQuality = 90;
 
 /// Textures in the pass that makes the tiles. A tile's texture depends on the photo alone; its members stand before the
 /// tile, so that a conversion that is resumed goes on at the next tile.
-class TextureStage {
+class TextureStage final : public Stage {
  public:
   /// Decides place, size and format, and how much the photo may keep for `tiles_at_once`. Reads no pixel.
   /// Throws Error{kInvalidArgument} naming the option or the photo at fault.
@@ -33,19 +34,16 @@ class TextureStage {
   /// Photo pixels under the side of a texel, the larger of both directions.
   [[nodiscard]] double pixels_per_texel() const { return pixels_per_texel_; }
 
-  /// The members of a tile, the coarsest level first; none where the photo does not show it. Any thread.
-  using Encoded = std::vector<std::vector<std::byte>>;
-  [[nodiscard]] Encoded encode(TileIndex tile) const;
-
-  /// Hands a tile's members to the writer, before the tile itself.
-  void add(TileIndex tile, const Encoded& encoded, ArchiveWriter& writer) const;
-
-  /// The metadata's record, once all tiles are in.
-  [[nodiscard]] TextureInfo info(const ArchiveWriter& writer) const;
+  /// The members of a tile, the coarsest level first; none where the photo does not show it.
+  [[nodiscard]] std::unique_ptr<Made> make(TileIndex tile, const TileCodes& codes,
+                                           const EncodedTile& encoded) const override;
+  void add_before(TileIndex tile, const Made* made, ArchiveWriter& writer) override;
+  void describe(const ArchiveWriter& writer, Metadata& metadata, ConvertSummary& summary) const override;
 
  private:
   struct Layout;
   TextureStage(std::unique_ptr<PhotoSource> bordered, PhotoSource& photo, TextureInfo info, Layout layout);
+  using Encoded = std::vector<std::vector<std::byte>>;
   [[nodiscard]] bool shows(TileIndex tile) const;
 
   std::unique_ptr<PhotoSource> bordered_;      ///< the user's photo, where it shows a part of the ground; or nullptr
