@@ -140,6 +140,8 @@ TEST(JsonSchema, HoldsForEveryCommandsSuccessAndFailure) {
   documents.run(1, "error", {"verify", folder / "none.isohf"});
 
   documents.run(0, "export", {"export", a, folder / "a.tif"});
+  documents.run(0, "export", {"export", a, folder / "a.glb", "--level", "1"});
+  documents.run(0, "export", {"export", a, folder / "a.ply", "--max-error", "5"});
   documents.run(0, "export", {"export", b, folder / "b.npy", "--size", "50x50", "--progress", "json"});
   documents.run(0, "export", {"export", d, folder / "d.tif", "--like", degrees});
   documents.run(2, "error", {"export", a, folder / "a.tif"});
