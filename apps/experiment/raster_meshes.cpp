@@ -117,12 +117,7 @@ class Study {
 
  private:
   [[nodiscard]] SourceAxis axis(std::int64_t samples, double first, double spacing, const Mesh& mesh) const {
-    return {samples,
-            first,
-            spacing,
-            record_.registration,
-            known(surface_.outside, "outside"),
-            kContinuedSteps * std::max(mesh.spacing_x, mesh.spacing_z)};
+    return {samples, first, spacing, record_.registration, kContinuedSteps * std::max(mesh.spacing_x, mesh.spacing_z)};
   }
 
   [[nodiscard]] Laid lay(const Mesh& mesh, const std::array<double, 2>& place) const {

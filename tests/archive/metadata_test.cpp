@@ -278,13 +278,13 @@ TEST(Metadata, RequiresOfReadersToKnowReferenceSystemsAsProjections) {
 TEST(Metadata, NamesThatThisBuildDoesNotKnowAreNoValues) {
   std::string json = format_metadata(full());
   const Metadata whole = parse_metadata(json);
-  EXPECT_TRUE(whole.filter && whole.acquisition && whole.outside && whole.edges);
+  EXPECT_TRUE(whole.filter && whole.acquisition && whole.edges);
   EXPECT_NE(whole.source.registration, Registration::kUnknown);
   auto altered = nlohmann::json::parse(json);
-  for (const char* name : {"filter", "acquisition", "outside", "edges"}) altered[name] = "nonsense";
+  for (const char* name : {"filter", "acquisition", "edges"}) altered[name] = "nonsense";
   altered["source"]["registration"] = "nonsense";
   const Metadata metadata = parse_metadata(altered.dump());
-  EXPECT_FALSE(metadata.filter || metadata.acquisition || metadata.outside || metadata.edges);
+  EXPECT_FALSE(metadata.filter || metadata.acquisition || metadata.edges);
   EXPECT_EQ(metadata.source.registration, Registration::kUnknown);
 }
 

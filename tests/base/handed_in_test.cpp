@@ -89,10 +89,9 @@ TEST_F(HandedIn, LevelsOutsideOf1To14AreRefusedWithAndWithoutAShape) {
 
 TEST_F(HandedIn, LatticesThroughSamplesGoWithNothingThatMovesThem) {
   using Change = void (*)(PlanRequest&);
-  for (const Change change : {Change([](PlanRequest& plan) { plan.fit = true; }), Change([](PlanRequest& plan) {
-                                plan.tiles = {2, 2};
-                              }),
-                              Change([](PlanRequest& plan) { plan.density = 2.0; })}) {
+  for (const Change change :
+       {Change([](PlanRequest& plan) { plan.fit = true; }), Change([](PlanRequest& plan) { plan.spacing = 2.0; }),
+        Change([](PlanRequest& plan) { plan.density = 2.0; })}) {
     EXPECT_THAT(converting([&](auto& options, auto&) { options.plan.through_samples = true, change(options.plan); }),
                 HasSubstr("a lattice through the samples goes with none of"));
   }
@@ -128,7 +127,6 @@ TEST_F(HandedIn, NumbersThatAreNoEnumeratorsAreRefused) {
   EXPECT_THAT(converting([](auto& options, auto&) { options.code_type = CodeType(9); }), HasSubstr(kWhy));
   EXPECT_THAT(converting([](auto& options, auto&) { options.filter = Filter(77); }), HasSubstr(kWhy));
   EXPECT_THAT(converting([](auto& options, auto&) { options.filter = Filter(-1); }), HasSubstr(kWhy));
-  EXPECT_THAT(converting([](auto& options, auto&) { options.plan.outside = Outside(9); }), HasSubstr(kWhy));
   EXPECT_THAT(converting([](auto& options, auto&) { options.acquisition.kind = Acquisition::Kind(77); }),
               HasSubstr(kWhy));
   EXPECT_THAT(converting([](auto& options, auto&) { options.plan.ground.projection.kind = ProjectionKind(77); }),

@@ -59,9 +59,7 @@ struct Stages {
   }
 
   [[nodiscard]] SourceBand band() const { return {{heights.data(), kColumns, kRows}, 0}; }
-  [[nodiscard]] SourceAxis axis() const {
-    return {kColumns, kSpacing / 2.0, kSpacing, Registration::kArea, Outside::kCover, 60.0};
-  }
+  [[nodiscard]] SourceAxis axis() const { return {kColumns, kSpacing / 2.0, kSpacing, Registration::kArea, 60.0}; }
   [[nodiscard]] std::unique_ptr<TileResampler> cutter(Filter filter) const {
     return make_grid_resampler(grid, {axis(), axis()}, Kernel::make(filter), {-1e9, 1e9});
   }

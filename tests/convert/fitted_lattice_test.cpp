@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <string>
@@ -22,9 +23,9 @@ SourceInfo posts(std::int64_t width, std::int64_t height, double spacing_x = 1.0
   return info;
 }
 
-PlanRequest tiles(std::int64_t columns, std::int64_t rows) {
+PlanRequest fit() {
   PlanRequest request;
-  request.tiles = {{columns, rows}};
+  request.fit = true;
   return request;
 }
 
@@ -42,52 +43,6 @@ double share_beyond_the_source(const Plan& plan) {
   return plan.grid.world_width() * plan.grid.world_height() / (ground.x1 * ground.z1) - 1.0;
 }
 
-TEST(FittedLattice, ANumberOfTilesKeepsTheDensityNearOne) {
-  for (const auto& [columns, rows] : std::vector<std::pair<int, int>>{{1, 1}, {2, 2}, {3, 7}, {4, 1}, {1, 5}, {9, 9}}) {
-    const SourceInfo info = posts(1201, 1201, 66.27, 92.6);
-    const Plan plan = make_plan(info, tiles(columns, rows));
-    SCOPED_TRACE(testing::Message() << columns << "x" << rows);
-    EXPECT_EQ(plan.grid.tile_columns(), columns);
-    EXPECT_EQ(plan.grid.tile_rows(), rows);
-    EXPECT_NEAR(plan.density, 1.0, 0.05);
-    EXPECT_NEAR(aspect(plan), 1.0, 0.05);
-    EXPECT_NEAR(share_beyond_the_source(plan), 0.0, 1e-12);
-    EXPECT_THAT(warnings_of(info, tiles(columns, rows)), testing::IsEmpty());
-  }
-}
-
-TEST(FittedLattice, TilesThatCannotBeSoLargeKeepTheirAspectAndAreWarnedOf) {
-  const Plan plan = make_plan(posts(60000, 60000), tiles(1, 1));
-  EXPECT_LE(plan.grid.shape().columns(), kMaxTileColumns);
-  EXPECT_NEAR(aspect(plan), 1.0, 0.01);
-  EXPECT_LT(plan.density, 0.5);
-  EXPECT_THAT(warnings_of(posts(60000, 60000), tiles(1, 1)),
-              testing::ElementsAre(testing::HasSubstr("ask for other `tiles`")));
-}
-
-TEST(FittedLattice, AShapeAndTilesThatThinOutTheSourceAreWarnedOfWithTheFigure) {
-  PlanRequest request = tiles(2, 2);
-  request.shape = {{52, 67}};
-  const Plan plan = make_plan(posts(1201, 1201), request);
-  EXPECT_EQ(plan.grid.shape(), TileShape::make(52, 67, 4)) << "what is asked for is done";
-  const std::vector<Warning> warnings = warnings_of(posts(1201, 1201), request);
-  ASSERT_EQ(warnings.size(), 1U);
-  EXPECT_THAT(warnings[0], testing::HasSubstr("0.00853 vertices for one of the input's samples"));
-  EXPECT_THAT(warnings[0], testing::HasSubstr("leave out `shape` or `tiles`"));
-  request.shape.reset();
-  request.budget = ShapeBudget{ShapeBudget::Kind::kTriangles, 1000000};
-  EXPECT_THAT(warnings_of(posts(201, 201), request), testing::SizeIs(1)) << "far more than there are samples";
-}
-
-TEST(FittedLattice, ADensityOrSpacingThatIsAskedForIsNotWarnedOf) {
-  PlanRequest request;
-  request.density = 0.01;
-  EXPECT_THAT(warnings_of(posts(1201, 1201), request), testing::IsEmpty());
-  request = {};
-  request.spacing = 50.0;
-  EXPECT_THAT(warnings_of(posts(1201, 1201), request), testing::IsEmpty());
-}
-
 TEST(FittedLattice, EndsOnTheSourcesEdgeWithEquilateralTriangles) {
   constexpr unsigned kSeed = 3;
   std::mt19937 random(kSeed);
@@ -97,7 +52,7 @@ TEST(FittedLattice, EndsOnTheSourcesEdgeWithEquilateralTriangles) {
     const std::int64_t width = side(random);
     const std::int64_t height = side(random);
     const double spacing_y = stretch(random);
-    const Plan plan = make_plan(posts(width, height, 1.0, spacing_y), {});
+    const Plan plan = make_plan(posts(width, height, 1.0, spacing_y), fit());
     SCOPED_TRACE(testing::Message() << width << "x" << height << ", spacing 1 x " << spacing_y << ", seed " << kSeed);
     EXPECT_LE(share_beyond_the_source(plan), 1e-12);
     EXPECT_GE(plan.grid.world_width(), static_cast<double>(width - 1)) << "not short of it by a rounding";
@@ -105,32 +60,59 @@ TEST(FittedLattice, EndsOnTheSourcesEdgeWithEquilateralTriangles) {
     EXPECT_GE(plan.density, 0.97);
     EXPECT_LE(plan.density, 1.05);
     EXPECT_NEAR(aspect(plan), 1.0, 0.03);
+    const double square = plan.grid.extent_x() / plan.grid.extent_z();
+    EXPECT_LE(std::max(square, 1.0 / square), 1.125 * 1.03) << "an eighth, of nearly equilateral triangles";
     // Padding is the only thing that is stored twice, and tiles stay as large as the usual one.
     EXPECT_LT(static_cast<double>(plan.lattice_samples), 1.2 * static_cast<double>(width * height));
   }
 }
 
-TEST(FittedLattice, WhatIsAskedForKeepsItsSquareTiles) {
-  PlanRequest density;
-  density.density = 0.866;
-  PlanRequest spacing;
-  spacing.spacing = 1.3;
-  PlanRequest shape;
-  shape.shape = {{52, 67}};
-  PlanRequest budget;
-  budget.budget = ShapeBudget{ShapeBudget::Kind::kTriangles, 20000};
-  for (const PlanRequest& request : {density, spacing, shape, budget}) {
+TEST(FittedLattice, ADensityOrSpacingThatIsAskedForIsKeptToAFewPerCent) {
+  for (const double density : {0.25, 0.866, 2.0}) {
+    PlanRequest request = fit();
+    request.density = density;
     const Plan plan = make_plan(posts(1500, 1100), request);
-    EXPECT_EQ(plan.grid.extent_x(), plan.grid.extent_z());
+    EXPECT_LE(share_beyond_the_source(plan), 1e-12);
+    EXPECT_NEAR(plan.density / density, 1.01, 0.041);
+    EXPECT_NEAR(aspect(plan), 1.0, 0.03);
   }
+  PlanRequest request = fit();
+  request.spacing = 1.7;
+  const Plan plan = make_plan(posts(1500, 1100), request);
+  EXPECT_LE(share_beyond_the_source(plan), 1e-12);
+  EXPECT_NEAR(2.0 * plan.grid.sigma_x(), 1.7, 0.1);
+}
+
+TEST(FittedLattice, TilesOfAShapeAreStretchedByAnEighthAtMost) {
+  for (std::int64_t width = 60; width < 2000; width += 37) {
+    PlanRequest request = fit();
+    request.shape = {{52, 67}};
+    const SourceInfo info = posts(width, 777);
+    const Plan plan = make_plan(info, request);
+    EXPECT_EQ(plan.grid.shape(), TileShape::make(52, 67, 4));
+    const std::vector<Warning> warnings = warnings_of(info, request);
+    if (share_beyond_the_source(plan) > 1e-12) {
+      EXPECT_EQ(plan.grid.extent_x(), plan.grid.extent_z()) << width;
+      EXPECT_THAT(warnings, testing::ElementsAre(testing::HasSubstr("ask for smaller tiles")));
+      EXPECT_LT(width, 250) << "of many tiles each is stretched by little";
+    } else {
+      EXPECT_NEAR(plan.grid.extent_x() / plan.grid.extent_z(), 1.0, 0.27) << width;
+      EXPECT_THAT(warnings, testing::IsEmpty());
+    }
+  }
+}
+
+TEST(FittedLattice, ARasterTooSmallForItGetsSquareTilesAndAWarning) {
+  const Plan plan = make_plan(posts(3, 2), fit());
+  EXPECT_EQ(plan.grid.extent_x(), plan.grid.extent_z());
+  EXPECT_THAT(warnings_of(posts(3, 2), fit()), testing::ElementsAre(testing::HasSubstr("reach beyond its edge")));
+  EXPECT_THAT(warnings_of(posts(3, 2), {}), testing::IsEmpty());
 }
 
 TEST(FittedLattice, TheLevelsAskedForAreKept) {
   for (const int levels : {1, 3, 6}) {
-    PlanRequest request;
+    PlanRequest request = fit();
     request.levels = levels;
-    EXPECT_EQ(make_plan(posts(2000, 2000), request).grid.shape().levels(), levels);
-    request.tiles = {{2, 3}};
     EXPECT_EQ(make_plan(posts(2000, 2000), request).grid.shape().levels(), levels);
   }
 }

@@ -195,9 +195,8 @@ TEST(TextureStage, StoresWhatTheCutterCutsForEveryTileWithGround) {
 
 TEST(TextureStage, ChoosesTexelsNoCoarserThanPixels) {
   const test::TemporaryFolder folder;
-  Hills source(96, 96);
+  Hills source(106, 106);  // 2 x 2 tiles
   ConvertOptions options;
-  options.plan.tiles = {2, 2};
   options.plan.fit = true;
   options.plan.shape = {52, 67};
   const Plan plan = make_plan(source.info(), options.plan);

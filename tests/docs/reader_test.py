@@ -28,7 +28,7 @@ def globe(folder):
 def cases(folder):
     yield VOIDS, []
     yield VOIDS, ["--type", "u8", "--filter", "bilinear", "--shape", "20x19"]
-    yield VOIDS, ["--type", "f32", "--outside", "void", "--shape", "20x19"]
+    yield VOIDS, ["--type", "f32", "--shape", "20x19"]
     yield VOIDS, ["--to-crs", "local", "--type", "f32"]
     yield VOIDS, ["--to-crs", "utm", "--max-error", "7"]
     yield RIDGES, ["--density", "0.4"]

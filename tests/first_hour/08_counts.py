@@ -29,7 +29,7 @@ def main():
     # All lie outside: that is every vertex, whatever the type and the tiles, beyond the border as well.
     for source in (coast, voids):
         for options in (("--type", "u16"), ("--type", "u8"), ("--type", "f32"), ("--shape", "44x67"),
-                        ("--outside", "clamp"), ("--outside", "void"), ("--density", "2.3")):
+                        ("--fit",), ("--density", "2.3")):
             clamped, all_, void = counts(source, "--z-range", "-1000:-900", *options)
             check(clamped == all_ - void, f"{source} {options}: {clamped} of {all_} with {void} void lie outside")
     # None does.

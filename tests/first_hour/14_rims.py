@@ -26,7 +26,7 @@ def main():
     write_asc("coast.asc", 240, 180, coast, west=500000.0, south=5000000.0, spacing=10.0)
     for options in ((), ("--type", "u8"), ("--type", "f32"), ("--filter", "bilinear"), ("--filter", "nearest"),
                     ("--filter", "bspline3"), ("--density", "0.3"), ("--density", "0.1"), ("--density", "2"),
-                    ("--shape", "44x67"), ("--fit",), ("--lossless",), ("--outside", "clamp")):
+                    ("--shape", "44x67"), ("--fit",), ("--lossless",)):
         kept("coast.asc", *options)
     kept(TESTDATA / "voids_200x150_int16.tif")
     degrees = write_tiff("degrees.tif", 240, 180, lambda c, r: -9999.0 if coast(c, r) is None else coast(c, r), kind="f",

@@ -73,7 +73,6 @@ TEST(Lossless, ReturnsIntegersForEveryFilterDensityAndCodeType) {
   for (const CodeType type : {CodeType::kU8, CodeType::kF32}) {
     ConvertOptions options;
     options.code_type = type;
-    options.plan.outside = Outside::kVoid;
     convert_to(source, folder / "a.isohf", options);
     expect_exact(source, folder / "a.isohf", to_string(type));
   }

@@ -185,8 +185,10 @@ TEST_P(PointSamplerTest, FindsAVertexAtItsOwnPlaceBesideVoids) {
 TEST_P(PointSamplerTest, RestoresSamplesThatAreVerticesBesideVoids) {
   const ArchiveReader archive(folder / "a.isohf");
   const TileGrid& grid = archive.grid();
-  const std::int64_t across = grid.shape().cell_columns() * grid.tile_columns();
-  const std::int64_t down = grid.shape().cell_rows() * grid.tile_rows() / 2;
+  // Of the source's ground, where rows of samples end.
+  const WorldBounds& ground = archive.metadata().valid;
+  const auto across = static_cast<std::int64_t>(ground.x1 / (2.0 * grid.sigma_x()));
+  const auto down = static_cast<std::int64_t>(ground.z1 / (2.0 * grid.sigma_z()));
   // Odd rows of vertices, by spacings that are no sums of powers of two.
   const SampleGrid samples{across, down, 1e-13, 1e-13, 2.0 * grid.sigma_x(), 2.0 * grid.sigma_z()};
   std::vector<double> exact(static_cast<std::size_t>(across * down));

@@ -30,7 +30,6 @@ double psnr_of_restoring(Filter filter, const TrigonometricField& field, int mar
   options.plan.shape = {30, 33};
   options.plan.levels = 1;
   options.plan.spacing = 1.0;
-  options.plan.outside = Outside::kCover;
   const test::TemporaryFolder folder;
   (void)convert(source, folder / "field.isohf", options);
 

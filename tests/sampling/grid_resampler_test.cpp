@@ -12,6 +12,9 @@
 #include <vector>
 
 #include "isohf/lattice/barycentric.h"
+#include "isohf/lattice/planes.h"
+#include "isohf/lattice/stitch.h"
+#include "isohf/lattice/strip.h"
 
 namespace isohf {
 namespace {
@@ -37,16 +40,13 @@ struct Fixture {
 
   [[nodiscard]] double first() const { return registration == Registration::kArea ? spacing / 2.0 : 0.0; }
   float& at(std::int64_t column, std::int64_t row) { return heights[static_cast<std::size_t>(row * width + column)]; }
-  [[nodiscard]] SourceAxis axis(std::int64_t samples, Outside outside) const {
-    return {samples, first(), spacing, registration, outside, 25.0};
-  }
-  [[nodiscard]] std::unique_ptr<TileResampler> cutter(const TileGrid& grid, Filter filter, Outside outside) const {
-    return make_grid_resampler(grid, {axis(width, outside), axis(height, outside)}, Kernel::make(filter), {-1e9, 1e9});
+  [[nodiscard]] SourceAxis axis(std::int64_t samples) const { return {samples, first(), spacing, registration, 25.0}; }
+  [[nodiscard]] std::unique_ptr<TileResampler> cutter(const TileGrid& grid, Filter filter) const {
+    return make_grid_resampler(grid, {axis(width), axis(height)}, Kernel::make(filter), {-1e9, 1e9});
   }
   /// Cuts with a band of just the samples that the cutter asks for.
-  [[nodiscard]] std::vector<float> cut(const TileGrid& grid, TileIndex tile, Filter filter = Filter::kBilinear,
-                                       Outside outside = Outside::kClamp) const {
-    const auto cutter_ = cutter(grid, filter, outside);
+  [[nodiscard]] std::vector<float> cut(const TileGrid& grid, TileIndex tile, Filter filter = Filter::kBilinear) const {
+    const auto cutter_ = cutter(grid, filter);
     const RowRange rows = cutter_->rows_needed(tile.row);
     std::vector<float> band;
     const auto read = [&](const Window& window) -> std::optional<SourceBand> {
@@ -82,7 +82,7 @@ TEST(GridResampler, ReproducesAPlaneToTheVeryEdgeOfTheSourceAndAsFarAsItGoesOn) 
     for (const Filter filter : kSlopes) {
       for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
         const TileIndex index = grid.tile_at(tile);
-        const std::vector<float> heights = source.cut(grid, index, filter, Outside::kCover);
+        const std::vector<float> heights = source.cut(grid, index, filter);
         for (int r = 0; r < 11; ++r) {
           for (int c = 0; c < 12; ++c) {
             const WorldPoint world = grid.world_from_lattice(grid.lattice_vertex(index, {c, r}));
@@ -209,19 +209,17 @@ TEST(GridResampler, SharedVerticesAndPaddingHaveTheSameBitsInEveryTile) {
   }
   const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 5, 5, 101.3, 97.7);
   for (const Filter filter : kFilters) {
-    for (const Outside outside : {Outside::kCover, Outside::kClamp, Outside::kVoid}) {
-      std::map<std::pair<std::int64_t, std::int64_t>, std::uint32_t> seen;
-      for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
-        const TileIndex index = grid.tile_at(tile);
-        const std::vector<float> heights = source.cut(grid, index, filter, outside);
-        for (int r = 0; r < 11; ++r) {
-          for (int c = 0; c < 12; ++c) {
-            const LatticeVertex vertex = grid.lattice_vertex(index, {c, r});
-            const float height = heights[static_cast<std::size_t>(r * 12 + c)];
-            const std::uint32_t bits = std::isnan(height) ? 0x7FC00000U : std::bit_cast<std::uint32_t>(height);
-            const auto [at, is_new] = seen.emplace(std::pair{vertex.x, vertex.z}, bits);
-            EXPECT_EQ(at->second, bits) << to_string(filter) << " vertex " << vertex.x << "," << vertex.z;
-          }
+    std::map<std::pair<std::int64_t, std::int64_t>, std::uint32_t> seen;
+    for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
+      const TileIndex index = grid.tile_at(tile);
+      const std::vector<float> heights = source.cut(grid, index, filter);
+      for (int r = 0; r < 11; ++r) {
+        for (int c = 0; c < 12; ++c) {
+          const LatticeVertex vertex = grid.lattice_vertex(index, {c, r});
+          const float height = heights[static_cast<std::size_t>(r * 12 + c)];
+          const std::uint32_t bits = std::isnan(height) ? 0x7FC00000U : std::bit_cast<std::uint32_t>(height);
+          const auto [at, is_new] = seen.emplace(std::pair{vertex.x, vertex.z}, bits);
+          EXPECT_EQ(at->second, bits) << to_string(filter) << " vertex " << vertex.x << "," << vertex.z;
         }
       }
     }
@@ -293,7 +291,7 @@ TEST(GridResampler, ReadsOnlyTheRowsThatItAskedFor) {
   const Fixture source(30, 200, Registration::kArea, bumps);
   const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 3, 25, 82.0, 82.0);
   for (const Filter filter : kFilters) {
-    const auto cutter = source.cutter(grid, filter, Outside::kCover);
+    const auto cutter = source.cutter(grid, filter);
     std::int64_t last_first = 0;
     for (std::int64_t row = 0; row < 25; ++row) {
       const RowRange rows = cutter->rows_needed(row);
@@ -305,25 +303,115 @@ TEST(GridResampler, ReadsOnlyTheRowsThatItAskedFor) {
       }
       last_first = rows.first;
       // A band of NaN around the asked rows changes nothing: with those rows alone, cut() never reads outside (ASan).
-      (void)source.cut(grid, {1, row}, filter, Outside::kCover);
+      (void)source.cut(grid, {1, row}, filter);
     }
   }
 }
 
-TEST(GridResampler, OutsideFollowsTheRule) {
+/// The end of the source in column steps and rows, and how far a vertex lies beyond it.
+double steps_beyond(const Fixture& source, const TileGrid& grid, LatticeVertex vertex) {
+  const SourceAxis x = source.axis(source.width);
+  const SourceAxis z = source.axis(source.height);
+  const WorldPoint world = grid.world_from_lattice(vertex);
+  return std::max((world.x - x.end_world()) / (2.0 * grid.sigma_x()), (world.z - z.end_world()) / grid.sigma_z());
+}
+
+TEST(GridResampler, BeyondTheSourceTheSlopeGoesOnForItsStepsAndTheSurfaceEndsAfterThree) {
   const Fixture source(20, 20, Registration::kPoint, [](double x, double z) { return static_cast<float>(x + z); });
-  const TileGrid grid = TileGrid::make(TileShape::make(12, 11, 2), 1, 1, 380.0, 380.0);  // twice the source
-  const int c = 8;
-  const int r = 7;
-  const WorldPoint world = grid.world_from_lattice(grid.lattice_vertex({0, 0}, {c, r}));
-  ASSERT_GT(world.x, 190.0);
-  ASSERT_GT(world.z, 190.0);
-  const auto value = [&](Outside outside) {
-    return source.cut(grid, {0, 0}, Filter::kBilinear, outside)[static_cast<std::size_t>(r * 12 + c)];
-  };
-  EXPECT_FLOAT_EQ(value(Outside::kClamp), 380.0F);
-  EXPECT_TRUE(std::isnan(value(Outside::kVoid)));
-  EXPECT_FLOAT_EQ(value(Outside::kCover), 380.0F + 2 * 25.0F) << "2.5 samples of slope 1 along both axes, then level";
+  const TileGrid grid = TileGrid::make(TileShape::make(54, 61, 1), 1, 1, 500.0, 500.0);
+  const std::vector<float> heights = source.cut(grid, {0, 0});
+  std::int64_t held = 0;
+  std::int64_t ended = 0;
+  for (int r = 0; r < 61; ++r) {
+    for (int c = 0; c < 54; ++c) {
+      const LatticeVertex vertex = grid.lattice_vertex({0, 0}, {c, r});
+      const double beyond = steps_beyond(source, grid, vertex);
+      const float height = heights[static_cast<std::size_t>(r * 54 + c)];
+      if (beyond <= 3.0) {
+        const auto continued = [](double place) { return std::clamp(place, -25.0, 190.0 + 25.0); };
+        const WorldPoint world = grid.world_from_lattice(vertex);
+        ASSERT_NEAR(height, continued(world.x) + continued(world.z), 2e-4) << "2.5 samples of slope 1, then level";
+        ++held;
+      } else if ((vertex.x % 4 != 0 && vertex.x != 100) || (vertex.z % 4 != 0 && vertex.z != 58)) {
+        // A vertex of the first two levels, and not at the tiles' end, where those of all levels are.
+        ASSERT_TRUE(std::isnan(height)) << c << "," << r;
+        ++ended;
+      }
+    }
+  }
+  EXPECT_GT(held, 500);
+  EXPECT_GT(ended, 500);
+}
+
+/// Every triangle of every level of detail that touches the source is whole, those of overviews too.
+TEST(GridResampler, NoLevelLosesGroundOfTheSource) {
+  std::mt19937 random(5);
+  for (int i = 0; i < 40; ++i) {
+    const auto width = static_cast<std::int64_t>(20 + random() % 130);
+    const auto height = static_cast<std::int64_t>(20 + random() % 130);
+    const Registration registration = i % 2 == 0 ? Registration::kArea : Registration::kPoint;
+    const Fixture source(width, height, registration, bumps);
+    const TileShape shape = TileShape::make(20, 19, 4);
+    const double extent = 150.0 + static_cast<double>(random() % 60);
+    const auto tiles = [&](std::int64_t samples) {
+      return static_cast<std::int64_t>(std::ceil(source.axis(samples).end_world() / extent));
+    };
+    const TileGrid grid = TileGrid::make(shape, tiles(width), tiles(height), extent, extent);
+    std::map<std::pair<std::int64_t, std::int64_t>, float> heights;
+    for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
+      const std::vector<float> cut = source.cut(grid, grid.tile_at(tile));
+      for (int r = 0; r < shape.rows(); ++r) {
+        for (int c = 0; c < shape.columns(); ++c) {
+          const LatticeVertex vertex = grid.lattice_vertex(grid.tile_at(tile), {c, r});
+          heights[{vertex.x, vertex.z}] = cut[static_cast<std::size_t>(r * shape.columns() + c)];
+        }
+      }
+    }
+    const WorldPoint end{source.axis(width).end_world(), source.axis(height).end_world()};
+    const int stride = plane_stride(shape);
+    const Planes planes(grid, stride, plane_count(grid, stride), false);
+    std::int64_t triangles = 0;
+    for (int plane = 0; plane <= planes.count(); ++plane) {
+      const TileShape& mesh = planes.mesh_shape();
+      for (int level = 0; level < mesh.levels(); ++level) {
+        const std::vector<std::uint32_t> strip = strip_indices(mesh, level);
+        std::vector<std::uint32_t> indices = stitch_indices(mesh);
+        for (std::size_t k = 0; k + 2 < strip.size(); ++k) {
+          if (strip[k] == strip[k + 1] || strip[k + 1] == strip[k + 2]) continue;  // between two rows
+          indices.insert(indices.end(), {strip[k], strip[k + 1], strip[k + 2]});
+        }
+        for (std::int64_t flat = 0; flat < planes.grid(plane).tile_count(); ++flat) {
+          const TileIndex tile = planes.grid(plane).tile_at(flat);
+          for (std::size_t t = 0; t + 2 < indices.size(); t += 3) {
+            double least_x = HUGE_VAL;
+            double least_z = HUGE_VAL;
+            double most_x = -HUGE_VAL;
+            double most_z = -HUGE_VAL;
+            bool is_whole = true;
+            for (std::size_t k = t; k < t + 3; ++k) {
+              const GridVertex at{static_cast<int>(indices[k]) % shape.columns(),
+                                  static_cast<int>(indices[k]) / shape.columns()};
+              const LatticeVertex vertex = planes.grid(plane).lattice_vertex(tile, at);
+              const LatticeVertex place = planes.place(plane, vertex);
+              const WorldPoint world = grid.world_from_lattice(place);
+              least_x = std::min(least_x, world.x);
+              least_z = std::min(least_z, world.z);
+              most_x = std::max(most_x, world.x);
+              most_z = std::max(most_z, world.z);
+              is_whole = is_whole && !planes.is_beyond(plane, vertex) && !std::isnan(heights.at({place.x, place.z}));
+            }
+            // Stitches have no area; of planes some lie where the tiles' edge stands in for all that is beyond.
+            if (plane > 0 && (least_x == most_x || least_z == most_z)) continue;
+            if (least_x >= end.x || least_z >= end.z) continue;
+            ++triangles;
+            ASSERT_TRUE(is_whole) << "plane " << plane << " level " << level << " triangle " << t / 3 << " at "
+                                  << least_x << ".." << most_x << "," << least_z << ".." << most_z << ", raster " << i;
+          }
+        }
+      }
+    }
+    EXPECT_GT(triangles, 100);
+  }
 }
 
 }  // namespace

@@ -194,7 +194,7 @@ TEST(HeightRows, TilesCutFromItsWindowsFollowTheRuleForVoids) {
       const Prefilter prefilter = Prefilter::make(kernel.filter(), Acquisition{});
       prefilter.filter({coefficients.data(), 61, 61});
       HeightRows rows(source, 0.0, false, CellStore::of_rows(source.info(), 2000));
-      const SourceAxis axis(61, 0.0, 10.0, Registration::kPoint, Outside::kClamp, 0.0);
+      const SourceAxis axis(61, 0.0, 10.0, Registration::kPoint, 0.0);
       const auto cutter = make_grid_resampler(grid, {axis, axis}, kernel, {-1e9, 1e9});
       std::vector<float> heights(12 * 11);
       for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {

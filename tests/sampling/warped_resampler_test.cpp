@@ -51,10 +51,8 @@ struct Fixture {
   }
 
   /// Cuts with a band of just the samples that the cutter asks for.
-  [[nodiscard]] std::vector<float> cut(TileIndex tile, Filter filter, Outside outside) const {
-    SourceGeometry with = geometry;
-    with.outside = outside;
-    const auto cutter = make_tile_resampler(grid, with, Kernel::make(filter), {-1e9, 1e9});
+  [[nodiscard]] std::vector<float> cut(TileIndex tile, Filter filter) const {
+    const auto cutter = make_tile_resampler(grid, geometry, Kernel::make(filter), {-1e9, 1e9});
     const RowRange rows = cutter->rows_needed(tile.row);
     const std::optional<Window> about = cutter->window_about(tile);
     std::vector<float> band;
@@ -66,7 +64,7 @@ struct Fixture {
         EXPECT_LE(window.row + window.rows, about->row + about->rows);
       }
       for (std::int64_t r = window.row; r < window.row + window.rows; ++r) {
-        const auto first = heights.begin() + r * with.width + window.column;
+        const auto first = heights.begin() + r * geometry.width + window.column;
         band.insert(band.end(), first, first + window.columns);
       }
       return SourceBand{{band.data(), window.columns, window.rows}, window.row, {}, window.column};
@@ -77,11 +75,10 @@ struct Fixture {
   }
 
   /// Calls for every stored vertex: its height and its place.
-  void for_each_vertex(Filter filter, Outside outside,
-                       const std::function<void(float, SourcePosition, LatticeVertex)>& look) const {
+  void for_each_vertex(Filter filter, const std::function<void(float, SourcePosition, LatticeVertex)>& look) const {
     const ExactWarp exact(*geometry.warp);
     for (std::int64_t tile = 0; tile < grid.tile_count(); ++tile) {
-      const std::vector<float> cut_heights = cut(grid.tile_at(tile), filter, outside);
+      const std::vector<float> cut_heights = cut(grid.tile_at(tile), filter);
       std::size_t i = 0;
       for (int r = 0; r < grid.shape().rows(); ++r) {
         for (int c = 0; c < grid.shape().columns(); ++c) {
@@ -108,7 +105,7 @@ TEST(WarpedResampler, ReproducesAPlaneOfTheSourceAtEveryVertexToItsVeryEdge) {
   for (const char* request : {"lambert-conformal", "transverse-mercator", "local"}) {
     const Fixture source(request, {5.0, 40.0, 12.0, 46.0}, 140, 120, slope);
     for (const Filter filter : {Filter::kBilinear, Filter::kLimitedCubic, Filter::kBspline3}) {
-      source.for_each_vertex(filter, Outside::kCover, [&](float height, SourcePosition at, LatticeVertex) {
+      source.for_each_vertex(filter, [&](float height, SourcePosition at, LatticeVertex) {
         if (!source.is_inside(at, 0.0)) return;
         const WarpPlace& place = *source.geometry.warp;
         const double expected =
@@ -129,7 +126,7 @@ TEST(WarpedResampler, GoesRoundTheSeamAndOverThePole) {
   const Fixture source("polar-stereographic", {-180.0, 60.0, 180.0, 90.0}, 720, 120, waves, true);
   std::int64_t near_seam = 0;
   for (const Filter filter : {Filter::kBilinear, Filter::kLimitedCubic, Filter::kBspline3}) {
-    source.for_each_vertex(filter, Outside::kCover, [&](float height, SourcePosition at, LatticeVertex) {
+    source.for_each_vertex(filter, [&](float height, SourcePosition at, LatticeVertex) {
       if (!source.is_inside(at, 0.0)) return;
       const WarpPlace& place = *source.geometry.warp;
       const double expected =
@@ -151,14 +148,12 @@ TEST(WarpedResampler, SharedVerticesHaveTheSameBitsInEveryTile) {
                  [](double x, double y) { return 50.0 * std::sin(x * 3.0) + 30.0 * std::cos(y * 5.0 + x); });
   for (int i = 0; i < 300; ++i) source.heights[random() % source.heights.size()] = kVoid;
   for (const Filter filter : kFilters) {
-    for (const Outside outside : {Outside::kCover, Outside::kClamp, Outside::kVoid}) {
-      std::map<std::pair<std::int64_t, std::int64_t>, std::uint32_t> seen;
-      source.for_each_vertex(filter, outside, [&](float height, SourcePosition, LatticeVertex vertex) {
-        const std::uint32_t bits = std::isnan(height) ? 0x7FC00000U : std::bit_cast<std::uint32_t>(height);
-        const auto [at, is_new] = seen.emplace(std::pair{vertex.x, vertex.z}, bits);
-        EXPECT_EQ(at->second, bits) << to_string(filter) << " vertex " << vertex.x << "," << vertex.z;
-      });
-    }
+    std::map<std::pair<std::int64_t, std::int64_t>, std::uint32_t> seen;
+    source.for_each_vertex(filter, [&](float height, SourcePosition, LatticeVertex vertex) {
+      const std::uint32_t bits = std::isnan(height) ? 0x7FC00000U : std::bit_cast<std::uint32_t>(height);
+      const auto [at, is_new] = seen.emplace(std::pair{vertex.x, vertex.z}, bits);
+      EXPECT_EQ(at->second, bits) << to_string(filter) << " vertex " << vertex.x << "," << vertex.z;
+    });
   }
 }
 
@@ -170,23 +165,12 @@ TEST(WarpedResampler, BeyondTheSourceFollowsTheRule) {
     };
     return std::max(over(at.u, source.geometry.width), over(at.v, source.geometry.height));
   };
-  std::int64_t voids = 0;
-  source.for_each_vertex(Filter::kBilinear, Outside::kVoid, [&](float height, SourcePosition at, LatticeVertex) {
-    if (beyond(at) > 0.02 || source.is_inside(at, -0.48)) {
-      EXPECT_EQ(std::isnan(height), beyond(at) > 0.02);
-    }
-    voids += std::isnan(height) ? 1 : 0;
-  });
-  EXPECT_GT(voids, 100);
-  source.for_each_vertex(Filter::kBilinear, Outside::kClamp,
-                         [&](float height, SourcePosition, LatticeVertex) { EXPECT_FALSE(std::isnan(height)); });
-  const SourceGeometry cover = source.geometry;
-  const SourceAxes axes = make_axes(source.grid, cover);
+  const SourceAxes axes = make_axes(source.grid, source.geometry);
   const auto reach = static_cast<double>(std::min(axes.x.continued_samples(), axes.z.continued_samples()) - 1);
   ASSERT_GT(reach, 1.0);
   std::int64_t continued = 0;
   std::int64_t ended = 0;
-  source.for_each_vertex(Filter::kBilinear, Outside::kCover, [&](float height, SourcePosition at, LatticeVertex) {
+  source.for_each_vertex(Filter::kBilinear, [&](float height, SourcePosition at, LatticeVertex) {
     if (beyond(at) > reach + 3.0) {
       EXPECT_TRUE(std::isnan(height));
       ++ended;
@@ -210,7 +194,7 @@ TEST(WarpedResampler, VoidsNeverLeakIntoElevations) {
   for (int i = 0; i < 2000; ++i) source.heights[random() % source.heights.size()] = kVoid;
   for (const Filter filter : kFilters) {
     std::int64_t voids = 0;
-    source.for_each_vertex(filter, Outside::kVoid, [&](float height, SourcePosition, LatticeVertex) {
+    source.for_each_vertex(filter, [&](float height, SourcePosition, LatticeVertex) {
       if (std::isnan(height)) {
         ++voids;
       } else {

@@ -159,8 +159,7 @@ void add_surface(const Metadata& metadata, Report& report) {
                                            describe_length(grid.extent_z(), metres)));
   report.detail("rounding", fmt::format("worst {:.4g}{}, {} vertices clamped", statistics.worst_rounding, unit,
                                         describe_count(statistics.clamped)));
-  report.detail("filter", fmt::format("{}, acquisition {}, beyond the source {}", name_of(metadata.filter),
-                                      name_of(metadata.acquisition), name_of(metadata.outside)));
+  report.detail("filter", fmt::format("{}, acquisition {}", name_of(metadata.filter), name_of(metadata.acquisition)));
 }
 
 /// What is stored besides elevations, and how much all of it takes.

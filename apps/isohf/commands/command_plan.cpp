@@ -126,7 +126,6 @@ Report report_of(const SourceInfo& info, const Plan& plan, const MemoryPlan& mem
                          length(grid.sigma_z()), plan.density));
   const std::string map = describe_map(frame.projection, frame.ground, options.plan.ground.why_no_map, frame.wraps_x);
   if (!map.empty()) report.line("map", map);
-  report.add("outside", to_string(plan.outside));
   report.add("projection",
              frame.projection ? ordered_json::parse(format_projection(*frame.projection)) : ordered_json(nullptr));
   report.add("ground", frame.ground ? ordered_json::parse(format_ground(*frame.ground)) : ordered_json(nullptr));
@@ -152,8 +151,8 @@ Report report_of(const SourceInfo& info, const Plan& plan, const MemoryPlan& mem
                                        length(frame.spacing_z), to_string(frame.registration)));
   report.detail("extent", fmt::format("{} by {}, tiles of {} by {}", length(grid.world_width()),
                                       length(grid.world_height()), length(grid.extent_x()), length(grid.extent_z())));
-  report.detail("input at", fmt::format("x {:.6g}..{:.6g}, z {:.6g}..{:.6g}; beyond it: {}", covered.x0, covered.x1,
-                                        covered.z0, covered.z1, to_string(plan.outside)));
+  report.detail("input at",
+                fmt::format("x {:.6g}..{:.6g}, z {:.6g}..{:.6g}", covered.x0, covered.x1, covered.z0, covered.z1));
   return report;
 }
 

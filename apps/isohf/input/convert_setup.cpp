@@ -84,7 +84,7 @@ void add_map_options(CLI::App& line, GroundRequest& request) {
 void add_lattice_options(CLI::App& line, PlanRequest& request, bool& spacing_in_metres) {
   group(line, "Lattice");
   option(line, "--density", "RATIO",
-         "Vertices per sample, as in 0.5 or 1/2; 0.866 is the isotropic optimum [default: 1]",
+         "Vertices per sample, as in 0.5 or 1/2; 0.866 is the isotropic optimum [default: about 1]",
          [&request](const std::string& text) { request.density = parse_ratio(text); });
   option(line, "--spacing", "LENGTH",
          "Distance between neighbouring columns of vertices: world units, or with a unit as in 30m, 0.5km, 100ft",
@@ -94,11 +94,9 @@ void add_lattice_options(CLI::App& line, PlanRequest& request, bool& spacing_in_
            spacing_in_metres = length.in_metres;
          });
   exclusive(line, {"--density", "--spacing"});
-  line.add_flag("--fit", request.fit, "Stretch tiles slightly to end on the input's edge");
-  choice<Outside>(line, "--outside", {{"cover", Outside::kCover}, {"clamp", Outside::kClamp}, {"void", Outside::kVoid}},
-                  "Beyond the input, continue the slope for two lattice steps and then level (cover), repeat the edge "
-                  "(clamp), or store nodata (void) [default: cover]",
-                  request.outside);
+  line.add_flag(
+      "--fit", request.fit,
+      "Stretch tiles by up to an eighth to end on the input's edge [default: square tiles, nodata beyond it]");
   group(line, "Tile shape");
   option(line, "--shape", "CxR|N", "Stored elevations per tile, as in 212x243; or the best shape of about N triangles",
          [&request](const std::string& text) { parse_shape(text, request); });

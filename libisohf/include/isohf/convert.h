@@ -40,20 +40,18 @@ struct GroundRequest {
 /// request.why_no_map says why where that cannot be. Without it such a source keeps its map, unexamined.
 void understand_ground(const SourceInfo& info, GroundRequest& request);
 
-/// What is asked of the lattice and its tiles. At most one of density, spacing and tiles is given; at most one of shape
-/// and budget.
+/// What is asked of the lattice and its tiles. At most one of density and spacing is given; at most one of shape and
+/// budget.
 struct PlanRequest {
   std::optional<std::pair<int, int>> shape;  ///< C, R; nullopt: chosen
   std::optional<int> levels;                 ///< Λ; nullopt: 4, or fewer for small sources
   std::optional<ShapeBudget> budget;         ///< of one tile
-  std::optional<double> density;             ///< lattice samples for one source sample, > 0; nullopt: 1
+  std::optional<double> density;             ///< lattice samples for one source sample, > 0; nullopt: about 1
   std::optional<double> spacing;             ///< lattice column step, world units, > 0
-  std::optional<std::pair<std::int64_t, std::int64_t>> tiles;  ///< tile columns, rows
   /// Instead: a column for each of the source's and two rows for each, so that every sample is a vertex: twice as many
   /// vertices as samples. Not for sources that are projected, or joined with columns that no tiles divide.
   bool through_samples = false;
-  bool fit = false;  ///< stretch the extents a little so that tiles end on the source's edge
-  Outside outside = Outside::kCover;
+  bool fit = false;  ///< stretch tiles by an eighth at most so that they end on the source's edge; else they are square
   GroundRequest ground;
 };
 

@@ -151,7 +151,6 @@ struct Metadata {
   std::optional<ProjectionRecord> projection;  ///< absent where world space is the source's own plane
   bool wraps_x = false;                        ///< the East edge of the last tiles is the West edge of the first
   // nullopt: a name that this build does not know; the surface can be read all the same.
-  std::optional<Outside> outside = Outside::kCover;
   std::optional<Filter> filter = Filter::kBilinear;
   std::optional<Edges> edges = Edges::kOdd;  ///< how samples went on beyond the source's ends
   std::optional<Acquisition> acquisition = Acquisition{};

@@ -28,16 +28,6 @@ enum class Edges {
 /// What convert() does: kHeld for kBspline3, kOdd for filters whose result it does not change.
 [[nodiscard]] Edges usual_edges(Filter filter);
 
-/// What surrounds the source: tiles reach past its last sample unless they were fitted to it.
-enum class Outside {
-  kCover,  ///< the slope goes on for two lattice steps, then level: planes hold up to the source's edge
-  kClamp,  ///< the edge value goes on
-  kVoid,   ///< no elevation
-};
-
-[[nodiscard]] std::string to_string(Outside outside);                ///< "cover", "clamp", "void"
-[[nodiscard]] Outside outside_from_string(const std::string& text);  ///< throws Error{kInvalidArgument}
-
 /// What the sensor or producer did to the terrain before it sampled it: the filter phi of which every source sample is
 /// one reading, sample(k) = integral of phi(x) height(k - x) dx, along columns and rows alike. Distances are in source
 /// samples. phi is even and integrates to 1.

@@ -34,7 +34,7 @@ struct Conversion {
 
   /// How far a code may lie from what was computed, where that is more than half of a step that was asked for; else 0.
   [[nodiscard]] double most_off() const { return chooses_codes(options) ? *options.max_rounding - height_error : 0.0; }
-  [[nodiscard]] SourceGeometry geometry() const { return plan.frame.geometry(plan.outside); }
+  [[nodiscard]] SourceGeometry geometry() const { return plan.frame.geometry(); }
   /// Elevations beyond the source's edge are held within a range.
   [[nodiscard]] std::unique_ptr<TileResampler> cutter(const ElevationRange& held_within) const {
     return make_tile_resampler(plan.grid, geometry(), kernel, held_within);

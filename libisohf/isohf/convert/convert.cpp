@@ -240,7 +240,7 @@ Sums Windows::errors_in(HeldWindow& window, const Plan& plan, const Reconstructi
   const TileShape shape = TileShape::make(static_cast<int>(cells) + 4, 2 * std::max(static_cast<int>(pairs), 1) + 3, 1);
   const TileGrid tile =
       TileGrid::make(shape, 1, 1, column_step * shape.cell_columns(), grid.sigma_z() * shape.cell_rows());
-  SourceGeometry geometry = frame.geometry(plan.outside);
+  SourceGeometry geometry = frame.geometry();
   geometry.first_sample_x -= west * column_step;
   geometry.first_sample_z -= north * row_pair;
   const Window& held = window.held;
@@ -276,11 +276,6 @@ Sums Windows::errors_in(HeldWindow& window, const Plan& plan, const Reconstructi
     window.filter.reset();
   }
   store(storing, smooth, heights);
-  // There the archive's tiles end, with vertices that this one does not have.
-  const auto is_at_border = [&, all = frame.bounds()](WorldPoint at) {
-    return plan.outside == Outside::kVoid && (warp || std::min(at.x - all.x0, all.x1 - at.x) < column_step ||
-                                              std::min(at.z - all.z0, all.z1 - at.z) < row_pair);
-  };
   const View2D<const float> view(heights.data(), shape.columns(), shape.rows());
   Sums sums;
   for (std::int64_t r = compared.row; r < compared.row + compared.rows; ++r) {
@@ -293,7 +288,7 @@ Sums Windows::errors_in(HeldWindow& window, const Plan& plan, const Reconstructi
       const double error =
           std::abs(interpolate(snapped(barycentric(shape, object)), view) - double{window.heights[at]});
       if (!(error >= 0.0)) {  // void
-        sums.lost += std::isnan(window.heights[at]) || is_at_border(place) ? 0 : 1;
+        sums.lost += std::isnan(window.heights[at]) ? 0 : 1;
         continue;
       }
       ++sums.count;
@@ -339,7 +334,7 @@ double expected_step(const SourceInfo& info, const ConvertOptions& options) {
 
 /// Whether the density is convert()'s to choose.
 bool is_density_free(const PlanRequest& request) {
-  return !request.density && !request.spacing && !request.tiles;
+  return !request.density && !request.spacing;
 }
 
 /// Plans in the order of their cost.

@@ -113,7 +113,7 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
   return fmt::format(
       "{} | {} {} bytes {}.{:09} {}x{} {} channel '{}' scale {} {} void {} | shape {}x{}/{} tiles {}x{} extent {} {} "
       "first {} {} "
-      "spacing {} {} {} | {} range {} step {} clamp {} | {} {} | level {} | statistics of the source | seeds {}",
+      "spacing {} {} | {} range {} step {} clamp {} | {} {} | level {} | statistics of the source | seeds {}",
       of_files ? producer_of(options) : "",
       // The archive itself knows its source by the name that it states.
       of_files || options.source_note.name.empty() ? std::filesystem::path(info.path).filename().string()
@@ -122,7 +122,7 @@ std::string heights_fingerprint(const SourceInfo& info, const Plan& plan, const 
       info.height, to_string(info.sample_type), info.channel, info.z_scale, info.z_offset, describe_voids(info),
       shape.columns(), shape.rows(), shape.levels(), plan.grid.tile_columns(), plan.grid.tile_rows(),
       plan.grid.extent_x(), plan.grid.extent_z(), plan.frame.first_sample_x, plan.frame.first_sample_z,
-      plan.frame.spacing_x, plan.frame.spacing_z, to_string(plan.outside), to_string(options.code_type),
+      plan.frame.spacing_x, plan.frame.spacing_z, to_string(options.code_type),
       options.z_range ? fmt::format("{}:{}", options.z_range->first, options.z_range->second) : "data",
       options.step           ? fmt::format("{}", *options.step)
       : options.max_rounding ? fmt::format("rounding {}", *options.max_rounding)
@@ -187,8 +187,8 @@ std::string difference_from_job(const std::string& archive, const SourceInfo& in
     if (theirs == ours) return;
     found += fmt::format("{}{} {}, not {}", found.empty() ? "" : ", ", name, theirs.dump(), ours.dump());
   };
-  for (const char* name : {"tile_shape", "tiles", "extent", "valid", "outside", "projection", "planes", "wraps_x",
-                           "filter", "acquisition", "edges", "level", "source"}) {
+  for (const char* name : {"tile_shape", "tiles", "extent", "valid", "projection", "planes", "wraps_x", "filter",
+                           "acquisition", "edges", "level", "source"}) {
     const nlohmann::json theirs = made.value(name, nlohmann::json());
     const nlohmann::json ours = asked.value(name, nlohmann::json());
     if (!theirs.is_object() || !ours.is_object()) {
@@ -231,7 +231,6 @@ Metadata describe_job(const SourceInfo& info, const Plan& plan, const ConvertOpt
   metadata.valid = plan.frame.bounds();
   metadata.valid.x1 = std::min(metadata.valid.x1, plan.grid.world_width());
   metadata.valid.z1 = std::min(metadata.valid.z1, plan.grid.world_height());
-  metadata.outside = plan.outside;
   metadata.projection = plan.frame.projection;
   metadata.wraps_x = plan.frame.wraps_x;
   if (options.planes) metadata.planes = planes_for(plan.grid);

@@ -79,23 +79,23 @@ struct GridSampler::Block {
 };
 
 GridSampler::GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTile read_tile,
-                         const SampleGrid& samples, RestoreMethod method, const std::optional<TileGrid>& world,
+                         const SampleGrid& samples, RestoreMethod method, const std::optional<WorldBounds>& ground,
                          const ScratchFolder& scratch, const std::optional<Turn>& turn)
     : grid_(grid),
       quantisation_(quantisation),
-      samples_(require_samples_near(samples, world.value_or(grid))),
+      samples_(require_samples_near(samples, grid)),
       method_(method),
-      end_z_(world.value_or(grid).world_height()),
-      tolerance_(world ? kRoundedPlace : kRounding),
+      end_z_(ground ? ground->z1 : grid.world_height()),
+      tolerance_(ground ? kRoundedPlace : kRounding),
       spline_(grid, method == RestoreMethod::kHex ? columns_of(samples, turn, tolerance_) : std::vector<double>{},
               wraps_x, scratch),
       in_scratch_(scratch.has_value()),
       heights_(static_cast<std::size_t>(samples.width), scratch),
       near_void_(static_cast<std::size_t>(samples.width), scratch) {
+  const double end_x = ground ? ground->x1 : grid.world_width();
   for (const double x : columns_of(samples, turn, tolerance_)) {
     const TilePoint at = grid_.locate({x, 0.0});
-    columns_.push_back(
-        {is_inside(x, tolerance_ * samples.spacing_x, world.value_or(grid).world_width()), at.tile.column, at.point.x});
+    columns_.push_back({is_inside(x, tolerance_ * samples.spacing_x, end_x), at.tile.column, at.point.x});
   }
   // Splines run along whole rows, triangles need what is under them.
   const bool needs_all = method_ == RestoreMethod::kHex;

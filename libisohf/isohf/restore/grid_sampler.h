@@ -26,12 +26,11 @@ const SampleGrid& require_samples_near(const SampleGrid& samples, const TileGrid
 class GridSampler {
  public:
   /// wraps_x  the grid's East edge is its West edge
-  /// world    where the surface ends, to a hundredth of a sample, as georeferences are rounded; nullopt: with the grid,
-  ///          beyond which a coarse plane's may reach
+  /// ground   where the source ends, to a hundredth of a sample, as georeferences are rounded; nullopt: with the grid
   /// scratch  keeps tile rows and lattice rows where memory has no room for them
   /// turn     columns that miss the ground are looked for some turns away
   GridSampler(const TileGrid& grid, bool wraps_x, const Quantisation& quantisation, ReadTile read_tile,
-              const SampleGrid& samples, RestoreMethod method, const std::optional<TileGrid>& world = {},
+              const SampleGrid& samples, RestoreMethod method, const std::optional<WorldBounds>& ground = {},
               const ScratchFolder& scratch = {}, const std::optional<Turn>& turn = {});
 
   /// What a sampler holds that reads so many rows at once, beside the elevations; an estimate.
@@ -71,7 +70,7 @@ class GridSampler {
   Quantisation quantisation_;
   SampleGrid samples_;
   RestoreMethod method_;
-  double end_z_;      ///< of the surface, world units
+  double end_z_;      ///< of the source, world units
   double tolerance_;  ///< beyond it, samples
   SplineRows spline_;
   std::vector<Column> columns_;

@@ -633,16 +633,17 @@ bool may_have_nodata(const Metadata& metadata, const SampleGrid& grid) {
     const bool is_sources = is_in_source_system(metadata, grid) && grid.width == all_columns(source) &&
                             grid.height == source.height && grid.first_x == source.origin_x &&
                             grid.first_z == source.origin_y && grid.spacing_x == source.crs_spacing_x;
-    return !is_sources || is_cut(metadata) || metadata.statistics.voids > 0 || metadata.outside == Outside::kVoid;
+    return !is_sources || is_cut(metadata) || metadata.statistics.voids > 0;
   }
-  const TileGrid& tiles = metadata.grid;
+  const WorldBounds& ground = metadata.valid;
   const auto turn = turn_of(metadata);
   const bool goes_round = turn && turn->ground_x1 - turn->ground_x0 >= turn->length * (1.0 - 1e-9);
   const double first_x = goes_round ? 0.0 : turn ? turn->onto_ground(grid.first_x, 0.0) : grid.first_x;
   const double last_x = goes_round ? 0.0 : first_x + static_cast<double>(grid.width - 1) * grid.spacing_x;
   const double last_z = grid.first_z + static_cast<double>(grid.height - 1) * grid.spacing_z;
-  return is_warped(metadata) || metadata.statistics.voids > 0 || metadata.outside == Outside::kVoid || first_x < 0.0 ||
-         grid.first_z < 0.0 || last_x > tiles.world_width() || last_z > tiles.world_height();
+  constexpr double kOnTheEdge = 1e-6;  // of a spacing; edges are computed by products
+  return is_warped(metadata) || metadata.statistics.voids > 0 || first_x < 0.0 || grid.first_z < 0.0 ||
+         last_x > ground.x1 + kOnTheEdge * grid.spacing_x || last_z > ground.z1 + kOnTheEdge * grid.spacing_z;
 }
 
 Georeference source_georeference(const SourceRecord& source) {

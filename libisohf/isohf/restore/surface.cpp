@@ -285,7 +285,7 @@ RestoreMethod restore_method_from_string(const std::string& text) {
 
 struct RowReader::State {
   State(const ArchiveReader& archive, const SampleGrid& its_grid, RestoreMethod method, const Job& job, int plane = 0)
-      : grid(its_grid), world(archive.grid()) {
+      : grid(its_grid), world(archive.grid()), ground(ground_of(archive.metadata())) {
     const Metadata& metadata = archive.metadata();
     require_samples(grid);
     require_known("the method", method, RestoreMethod::kAverage);
@@ -303,7 +303,7 @@ struct RowReader::State {
     outline = SourceOutline::of(metadata);
     if (!grid.goes_by_places()) {
       rows.emplace(tiles, metadata.wraps_x, metadata.quantisation, tiles_of(archive, plane), grid, method,
-                   metadata.grid, choose_memory(tiles, method, job), turn_of(metadata));
+                   metadata.valid, choose_memory(tiles, method, job), turn_of(metadata));
       return;
     }
     georeference.emplace(metadata);
@@ -314,6 +314,12 @@ struct RowReader::State {
     std::uint64_t kept = std::max(kTileBytes, row_bytes);
     if (job.memory_bytes > 0) kept = std::min(kept, std::max(kTileBytes, job.memory_bytes / 2));
     points.emplace(tiles, metadata.quantisation, tiles_of(archive, plane), kept, GroundScale{}, metadata.grid);
+  }
+
+  [[nodiscard]] static WorldBounds ground_of(const Metadata& metadata) {
+    constexpr double kRounded = 0.01;  // of a sample
+    const SourceRecord& source = metadata.source;
+    return {0.0, 0.0, metadata.valid.x1 + kRounded * source.spacing_x, metadata.valid.z1 + kRounded * source.spacing_z};
   }
 
   /// As many rows at once as there is room for.
@@ -384,6 +390,9 @@ struct RowReader::State {
       }
     });
     points->sample(at, elevations);
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      if (at[i].x > ground.x1 || at[i].z > ground.z1) elevations[i] = std::numeric_limits<double>::quiet_NaN();
+    }
     if (outline) outline->hold(elevations, [&](std::size_t i) { return at[i]; });
   }
 
@@ -438,6 +447,7 @@ struct RowReader::State {
 
   SampleGrid grid;
   TileGrid world;
+  WorldBounds ground;  ///< of the source, and what georeferences are rounded by
   std::int64_t rows_at_once = 1;
   std::int64_t next_row = 0;  ///< the first that may still be read
   GridSize parts = {1, 1};

@@ -98,7 +98,6 @@ class Contradictions {
     check_one_of("units.horizontal", metadata_.horizontal_unit, {"metre", "unknown"});
     if (metadata_.vertical_unit.empty()) add("units.vertical", "is empty");
     const auto text = [](const Json& object, const char* member) { return object.at(member).get<std::string>(); };
-    check_one_of("outside", text(json_, "outside"), {"cover", "clamp", "void"});
     check_name("filter", [&] { (void)filter_from_string(text(json_, "filter")); });
     check_name("acquisition", [&] { (void)acquisition_from_string(text(json_, "acquisition")); });
     if (json_.contains("edges") && !json_.at("edges").is_null())

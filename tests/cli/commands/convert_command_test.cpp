@@ -128,9 +128,9 @@ TEST_F(ConvertCommand, EveryOptionChangesWhatItSays) {
   EXPECT_EQ(tiles.at("shape").at("levels"), 2);
   const json spaced = metadata("spaced.isohf", {"--sample-spacing", "30", "--spacing", "45", "--registration", "area"});
   EXPECT_NEAR(spaced.at("grid").at("column_spacing").get<double>(), 45.0, 1e-9);
-  const json outside = metadata("outside.isohf", {"--outside", "void", "--type", "f32"});
-  EXPECT_EQ(outside.at("metadata").at("outside"), "void");
-  EXPECT_EQ(outside.at("metadata").at("samples").at("type"), "f32");
+  const json floats = metadata("floats.isohf", {"--type", "f32"});
+  EXPECT_EQ(floats.at("metadata").at("samples").at("type"), "f32");
+  EXPECT_EQ(floats.at("grid").at("extent_x"), floats.at("grid").at("extent_z"));
   const json fitted = metadata("fitted.isohf", {"--fit", "--registration", "area"});
   EXPECT_NEAR(fitted.at("grid").at("world_width").get<double>(), 300.0, 1e-9);
   EXPECT_NEAR(fitted.at("grid").at("world_height").get<double>(), 200.0, 1e-9);

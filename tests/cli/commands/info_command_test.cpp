@@ -31,8 +31,8 @@ class InfoCommand : public testing::Test {
     write_float_tiff(folder / "a.tif", 200, 100, [](std::int64_t c, std::int64_t r) {
       return c < 100 ? static_cast<float>(c + 2 * r) : std::numeric_limits<float>::quiet_NaN();
     });
-    const RunResult result = run_isohf({"convert", folder / "a.tif", folder / "a.isohf", "--shape", "28x35", "--levels",
-                                        "2", "--type", "f32", "--outside", "void"});
+    const RunResult result = run_isohf(
+        {"convert", folder / "a.tif", folder / "a.isohf", "--shape", "28x35", "--levels", "2", "--type", "f32"});
     EXPECT_EQ(result.exit_code, 0) << result.err;
   }
 

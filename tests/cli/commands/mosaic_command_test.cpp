@@ -109,7 +109,7 @@ TEST_F(MosaicCommand, SeedsResidualsAndFloatsOfPiecesAreThoseOfTheWholeInAnyOrde
   write_pieces(raster, two, regular_cut(190, 140, 60, 1));  // neighbours share a row and a column of posts
   for (const Words& more : {Words{"--shadow-seeds"}, Words{"--lossless", "--filter", "bspline3"},
                             Words{"--type", "f32", "--acquisition", "box", "--filter", "bspline3"},
-                            Words{"--density", "0.7", "--outside", "void", "-j", "1"}}) {
+                            Words{"--density", "0.7", "--fit", "-j", "1"}}) {
     SCOPED_TRACE(more.front());
     Words options = {"--shape", "52x67"};
     options.insert(options.end(), more.begin(), more.end());

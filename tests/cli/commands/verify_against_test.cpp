@@ -105,7 +105,7 @@ TEST_F(VerifyAgainst, TakesTheOptionsOfTheInputFromTheArchive) {
         {"--z-scale", "0.5", "--z-offset", "-20"},
         {"--sample-spacing", "12"},
         {"--lossless"},
-        {"--outside", "void"},
+        {"--fit"},
         {"--type", "u8"},
         {"--type", "f32"},
         {"--filter", "bspline3", "--acquisition", "box"},
@@ -221,7 +221,7 @@ TEST_F(VerifyAgainst, TakesOptionsOfAnInputAloneFromTheArchive) {
 TEST_F(VerifyAgainst, OfAnExtractOnlyItsOwnGroundIsCompared) {
   const std::string part = folder / "part.isohf";
   for (const Words& with : std::vector<Words>{{}, {"--to-crs", "utm"}}) {
-    ASSERT_EQ(convert("land.flt", with_more({"--shape", "12x19", "--outside", "void"}, with)).exit_code, 0);
+    ASSERT_EQ(convert("land.flt", with_more({"--shape", "12x19"}, with)).exit_code, 0);
     ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", part, "--tiles", "1:3,1:2", "--overwrite"}).exit_code, 0);
     const Words against = {"verify", part, "--against", folder / "land.flt", "--json"};
     const RunResult sound = run_isohf(against);
@@ -236,7 +236,7 @@ TEST_F(VerifyAgainst, OfAnExtractOnlyItsOwnGroundIsCompared) {
 }
 
 TEST_F(VerifyAgainst, TakesWhatWasCutFromACoarsePlane) {
-  for (const Words& with : std::vector<Words>{{}, {"--outside", "void"}, {"--type", "f32"}}) {
+  for (const Words& with : std::vector<Words>{{}, {"--fit"}, {"--type", "f32"}}) {
     ASSERT_EQ(convert("land.flt", with_more({"--shape", "12x19", "--density", "2"}, with)).exit_code, 0);
     const std::string plane = folder / "plane.isohf";
     ASSERT_EQ(run_isohf({"extract", folder / "a.isohf", "-o", plane, "--overview", "1", "--overwrite"}).exit_code, 0);

@@ -46,7 +46,6 @@ void add_leaves(const json& value, const json::json_pointer& at, std::vector<jso
 bool is_free(const std::string& path) {
   static const std::vector<std::string> free = {"/producer",
                                                 "/level",
-                                                "/outside",
                                                 "/edges",
                                                 "/data_crc32",  // which putting together states anew
                                                 "/job_sha256",
@@ -144,7 +143,7 @@ TEST(AlteredArchives, GroundThatIsNoneIsAFinding) {
 
 TEST(AlteredArchives, NamesThatNobodyKnowsAreFindings) {
   const TemporaryFolder folder;
-  for (const char* path : {"/outside", "/filter", "/acquisition", "/units/horizontal", "/source/registration",
+  for (const char* path : {"/filter", "/acquisition", "/units/horizontal", "/source/registration",
                            "/source/sample_type", "/source/crs/unit"}) {
     AlteredArchive altered(kKept + "u16.isohf");
     altered.metadata[json::json_pointer(path)] = "nonsense";
@@ -399,9 +398,9 @@ TEST(AlteredArchives, NothingInThemReachesTheTerminalAsACommand) {
       "\x1b[31mred\x1b]0;title\x07 \xc2\x9b"
       "2J\nline \xe2\x80\xae";
   AlteredArchive altered(kKept + "u16-lossless-voids.isohf");
-  for (const char* path : {"/producer", "/filter", "/acquisition", "/outside", "/units/vertical", "/source/name",
-                           "/source/format", "/source/channel", "/source/crs/name", "/source/body/name",
-                           "/source/vertical_datum/name", "/source/registration"}) {
+  for (const char* path :
+       {"/producer", "/filter", "/acquisition", "/units/vertical", "/source/name", "/source/format", "/source/channel",
+        "/source/crs/name", "/source/body/name", "/source/vertical_datum/name", "/source/registration"}) {
     altered.metadata[json::json_pointer(path)] = bad;
   }
   altered.write(folder / "a.isohf");

@@ -88,7 +88,7 @@ TEST_F(ZRange, BothEndsHoldWhateverTheStepAndTheType) {
 TEST_F(ZRange, ClampedVerticesAreCountedExactly) {
   // Nearest: a vertex holds a sample, so those beyond the range are those of the same lattice without it. Each counts
   // once, however many tiles share it.
-  ASSERT_EQ(convert({"--outside", "clamp"}, "nearest").exit_code, 0);
+  ASSERT_EQ(convert({}, "nearest").exit_code, 0);
   const ArchiveReader free(folder / "a.isohf");
   const TileShape& shape = free.grid().shape();
   const CountedVertices counted(free.metadata());
@@ -103,7 +103,7 @@ TEST_F(ZRange, ClampedVerticesAreCountedExactly) {
       beyond += elevations[i] < 0.0 || elevations[i] > 100.0 ? 1 : 0;
     }
   }
-  const RunResult result = convert({"--z-range", "0:100", "--clamp-range", "--outside", "clamp", "--json"}, "nearest");
+  const RunResult result = convert({"--z-range", "0:100", "--clamp-range", "--json"}, "nearest");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(json::parse(result.out).at("metadata").at("statistics").at("clamped"), beyond);
 }

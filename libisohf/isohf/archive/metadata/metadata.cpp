@@ -274,7 +274,6 @@ void metadata_members(JsonMembers& json, Metadata& metadata) {
   json.object("units", "horizontal", metadata.horizontal_unit, "vertical", metadata.vertical_unit);
   WorldBounds& valid = metadata.valid;
   json.object("valid", "x0", valid.x0, "z0", valid.z0, "x1", valid.x1, "z1", valid.z1);
-  json.name("outside", metadata.outside, outside_from_string);
   json.object("projection", metadata.projection, projection_members, kNull);
   json("wraps_x", metadata.wraps_x);
   json.name("filter", metadata.filter, filter_from_string);

@@ -14,33 +14,30 @@ namespace {
 
 constexpr double kSin60 = std::numbers::sqrt3 / 2.0;
 
-/// Columns, rows and levels of a tile where neither the user nor a small source asks otherwise: the best true aspect in
-/// Table 1 (docs/decisions/0011).
-constexpr int kDefaultColumns = 212;
-constexpr int kDefaultRows = 243;
-constexpr int kDefaultLevels = 4;
+/// Columns, rows and levels of a tile that others are compared with: the best true aspect in Table 1
+/// (docs/decisions/0011).
+constexpr int kUsualColumns = 212;
+constexpr int kUsualRows = 243;
+constexpr int kUsualLevels = 4;
 
-/// A source of this many default tiles or more gets them; below, the shape is looked for that wastes least.
-constexpr double kManyTiles = 12.0;
-/// How far a shape that is chosen for a small source may be from equilateral.
-constexpr double kWorstAspect = 0.02;
-/// What one tile costs beyond its samples (header, index, directory, a draw call), in samples.
-constexpr double kTileOverhead = 4000.0;
-/// What a level given up must save.
-constexpr double kLevelWorth = 1.1;
-
-/// Where tiles are to end on the source's edge (docs/decisions/0025): the densities and the aspects of triangles that
-/// may come out, and how much larger than the usual one a tile may be, on a side.
+/// What may be chosen where nobody asks otherwise (docs/decisions/0025): densities, compared with the one that is wanted;
+/// how much larger than the usual tile another one may be, on a side; and how far triangles may be from equilateral.
 constexpr double kLeastDensity = 0.97;
 constexpr double kMostDensity = 1.05;
-constexpr double kWorstFittedAspect = 0.03;
-/// How far a tile may be from square: textures are square, and lie on it without visible distortion.
-constexpr double kWorstTileAspect = 0.125;
 constexpr double kLargestSide = 1.5;
-
-/// Densities that nobody means unless they ask for them.
-constexpr double kThinDensity = 0.5;
-constexpr double kThickDensity = 2.0;
+constexpr double kWorstAspect = 0.02;
+constexpr double kWorstFittedAspect = 0.03;
+/// What costs are multiplied by for any other density.
+constexpr double kFarDensity = 10.0;
+/// How far a tile of equilateral triangles may be from square, and how far one of a given shape may be stretched: textures
+/// are square, and lie on it without visible distortion.
+constexpr double kMostStretch = 0.125;
+/// What one tile costs beyond its samples (header, index, directory, a draw call), in samples.
+constexpr double kTileOverhead = 4000.0;
+/// In one direction, of shapes that are compared; of more the usual shape is taken.
+constexpr double kMostTilesTried = 1 << 16;
+/// What a level given up must save.
+constexpr double kLevelWorth = 1.15;
 /// The most that is done for those who ask: a tile then holds a small part of the ground between four samples.
 constexpr double kMostDensityAsked = 1 << 20;
 
@@ -59,29 +56,24 @@ std::int64_t tiles_to_cover(double length, double extent) {
   return std::max<std::int64_t>(1, static_cast<std::int64_t>(tiles));
 }
 
-/// Side of a square tile whose cells hold `density` lattice samples for one source sample.
-double extent_for_density(const TileShape& shape, const SourceFrame& frame, double density) {
-  return std::sqrt(static_cast<double>(shape.cell_columns()) * shape.cell_rows() * frame.spacing_x * frame.spacing_z /
-                   density);
+/// The nearest number of tiles.
+std::int64_t tiles_along(double length, double extent) {
+  return tiles_to_cover(std::max(length - extent / 2.0, 0.0), extent);
 }
 
-double extent_for(const TileShape& shape, const SourceFrame& frame, const PlanRequest& request) {
-  const WorldBounds bounds = frame.bounds();
-  if (request.tiles) {
-    return std::max(bounds.x1 / static_cast<double>(request.tiles->first),
-                    bounds.z1 / static_cast<double>(request.tiles->second));
-  }
-  if (request.spacing) return *request.spacing * shape.cell_columns();
-  return extent_for_density(shape, frame, request.density.value_or(1.0));
+/// Side of a square tile of the density or spacing that is wanted.
+double wanted_extent(int cell_columns, int cell_rows, const SourceFrame& frame, const PlanRequest& request) {
+  if (request.spacing) return *request.spacing * cell_columns;
+  return std::sqrt(static_cast<double>(cell_columns) * cell_rows * frame.spacing_x * frame.spacing_z /
+                   request.density.value_or(1.0));
 }
 
-/// Whether one tile of the usual size covers the source, at the density or spacing asked for; globes are cut into tiles
-/// of their own.
+/// Whether one tile of the usual size covers the source; globes are cut into tiles of their own.
 bool fits_one_tile(const SourceFrame& frame, const PlanRequest& request) {
-  if (request.tiles || frame.wraps_x) return false;
-  const TileShape usual = TileShape::nearest(kDefaultColumns, kDefaultRows, request.levels.value_or(kDefaultLevels));
+  if (frame.wraps_x) return false;
+  const TileShape usual = TileShape::nearest(kUsualColumns, kUsualRows, request.levels.value_or(kUsualLevels));
   const WorldBounds bounds = frame.bounds();
-  return std::max(bounds.x1, bounds.z1) <= extent_for(usual, frame, request);
+  return std::max(bounds.x1, bounds.z1) <= wanted_extent(usual.cell_columns(), usual.cell_rows(), frame, request);
 }
 
 /// Shape and grid of the tiles.
@@ -106,6 +98,35 @@ double extent_reaching(double length, std::int64_t tiles) {
   return extent;
 }
 
+/// Levels from those wanted down to one, or those asked for; unit: cells along a tile are multiples of it, rows of twice
+/// it; cost: what the levels that are given up count for.
+template <typename Use>
+void for_each_level(const PlanRequest& request, Use use) {
+  const int most = request.levels.value_or(kUsualLevels);
+  double cost = 1.0;
+  for (int levels = most; levels >= request.levels.value_or(1); --levels, cost *= kLevelWorth) {
+    use(levels, 1 << (levels - 1), cost);
+  }
+}
+
+bool is_near(double density) {
+  return density >= kLeastDensity && density <= kMostDensity;
+}
+
+/// What one sample costs in tiles of so many cells, by the samples that are stored for it, and by how far a tile's size
+/// is from the usual one.
+double cost_of_size(double cell_columns, double cell_rows) {
+  const double cells = cell_columns * cell_rows;
+  const double stored = (cell_columns + 4.0) * (cell_rows + 3.0) + kTileOverhead;
+  const double side = std::sqrt(cells / ((kUsualColumns - 4.0) * (kUsualRows - 3.0)));
+  return stored / cells * (1.0 + 0.2 * off(side));
+}
+
+/// What it costs that the density is not the one that is wanted, and triangles are not equilateral.
+double cost_of_misfit(double density, double aspect) {
+  return (1.0 + 0.5 * off(density)) * (1.0 + 0.5 * off(aspect));
+}
+
 /// Steps of one tile along one axis, and how many such tiles there are.
 struct AxisTiles {
   int cells;
@@ -113,22 +134,20 @@ struct AxisTiles {
   double ratio;  ///< of all steps to those wanted
 };
 
-/// Tiles that divide an axis into about `wanted` steps: `tiles` of them, or as many as are not much larger than
-/// `usual_cells`.
-std::vector<AxisTiles> axis_tiles(double wanted, int unit, int most_cells, int usual_cells,
-                                  const std::optional<std::int64_t>& tiles) {
+/// Tiles that divide an axis into about `wanted` steps: one, or as many as are not much larger than `usual_cells`.
+std::vector<AxisTiles> axis_tiles(double wanted, int unit, int usual_cells, bool is_one) {
   std::vector<AxisTiles> found;
   const auto add = [&](double cells, double count) {
-    if (cells < unit || cells > most_cells || count < 1.0 || count > static_cast<double>(kMaxTilesPerAxis)) return;
+    if (cells < unit || count < 1.0 || count > static_cast<double>(kMaxTilesPerAxis)) return;
     found.push_back({static_cast<int>(cells), static_cast<std::int64_t>(count), cells * count / wanted});
   };
-  if (tiles) {
-    const double units = std::floor(wanted / static_cast<double>(*tiles) / unit);
-    add(std::max(units, 1.0) * unit, static_cast<double>(*tiles));
-    add((units + 1.0) * unit, static_cast<double>(*tiles));
+  if (is_one) {
+    const double units = std::floor(wanted / unit);
+    add(std::max(units, 1.0) * unit, 1.0);
+    add((units + 1.0) * unit, 1.0);
     return found;
   }
-  for (int cells = unit; cells <= std::min(most_cells, static_cast<int>(kLargestSide * usual_cells)); cells += unit) {
+  for (int cells = unit; cells <= static_cast<int>(kLargestSide * usual_cells); cells += unit) {
     const double count = std::floor(wanted / cells);
     for (const double candidate : {count, count + 1.0}) {
       if (off(candidate * cells / wanted) < 2.0 * kWorstFittedAspect) add(cells, candidate);
@@ -137,102 +156,101 @@ std::vector<AxisTiles> axis_tiles(double wanted, int unit, int most_cells, int u
   return found;
 }
 
-/// A lattice that ends on the source's edges, of tiles that are only nearly square so that triangles are equilateral.
-/// With a number of tiles given, the one whose density lies nearest 1; else nullopt where none is near enough.
-std::optional<Lattice> fitted_lattice(const SourceFrame& frame, const PlanRequest& request) {
+/// Tiles, or one, that end on the source's edges and are only nearly square, so that triangles are equilateral; nullopt
+/// where none are near enough.
+std::optional<Lattice> fitted_lattice(const SourceFrame& frame, const PlanRequest& request, bool is_one) {
   const WorldBounds bounds = frame.bounds();
-  // Equilateral triangles, one vertex for a sample.
-  const double step = std::sqrt(frame.spacing_x * frame.spacing_z / kSin60);
-  double wanted_columns = bounds.x1 / step;
-  double wanted_rows = bounds.z1 / (step * kSin60);
-  std::optional<std::int64_t> tile_columns;
-  std::optional<std::int64_t> tile_rows;
-  if (request.tiles) {
-    tile_columns = request.tiles->first;
-    tile_rows = request.tiles->second;
-    // Tiles can only be so large: fewer vertices then, in both directions.
-    const double held = std::min({1.0, (kMaxTileColumns - 4) * static_cast<double>(*tile_columns) / wanted_columns,
-                                  (kMaxTileRows - 3) * static_cast<double>(*tile_rows) / wanted_rows});
-    wanted_columns *= held;
-    wanted_rows *= held;
-  } else if (fits_one_tile(frame, request)) {
-    tile_columns = tile_rows = 1;
-  }
-  const int most_levels = request.levels.value_or(kDefaultLevels);
-  const int fewest_levels = request.levels.value_or(1);
+  const double step = request.spacing
+                          ? *request.spacing
+                          : std::sqrt(frame.spacing_x * frame.spacing_z / (request.density.value_or(1.0) * kSin60));
   std::optional<Lattice> best;
   double best_cost = 0.0;
-  double level_cost = 1.0;
-  for (int levels = most_levels; levels >= fewest_levels; --levels, level_cost *= request.tiles ? 1.05 : 1.15) {
-    const int unit = 1 << (levels - 1);
-    const std::vector<AxisTiles> all_columns =
-        axis_tiles(wanted_columns, unit, kMaxTileColumns - 4, kDefaultColumns - 4, tile_columns);
-    const std::vector<AxisTiles> all_rows =
-        axis_tiles(wanted_rows, 2 * unit, kMaxTileRows - 3, kDefaultRows - 3, tile_rows);
+  for_each_level(request, [&](int levels, int unit, double level_cost) {
+    const std::vector<AxisTiles> all_columns = axis_tiles(bounds.x1 / step, unit, kUsualColumns - 4, is_one);
+    const std::vector<AxisTiles> all_rows = axis_tiles(bounds.z1 / (step * kSin60), 2 * unit, kUsualRows - 3, is_one);
     for (const AxisTiles& columns : all_columns) {
       for (const AxisTiles& rows : all_rows) {
         const double density = columns.ratio * rows.ratio;
         const double aspect = columns.ratio / rows.ratio;
-        double cost = level_cost * (1.0 + off(density)) * (1.0 + off(aspect));
-        if (!request.tiles) {
-          if (density < kLeastDensity || density > kMostDensity || off(aspect) > kWorstFittedAspect) continue;
-          const double cells = static_cast<double>(columns.cells) * rows.cells;
-          const double stored = (columns.cells + 4.0) * (rows.cells + 3.0) + kTileOverhead;
-          const double side = std::sqrt(cells / ((kDefaultColumns - 4.0) * (kDefaultRows - 3.0)));
-          const double square = columns.cells / (rows.cells * kSin60);
-          if (off(square) > kWorstTileAspect) continue;
-          cost = level_cost * stored / cells * (1.0 + 0.5 * off(density)) * (1.0 + 0.5 * off(aspect)) *
-                 (1.0 + 0.2 * off(side)) * (1.0 + 0.05 * off(square));
-        }
+        if (!is_near(density) || off(aspect) > kWorstFittedAspect) continue;
+        const double square = columns.cells / (rows.cells * kSin60);  // of equilateral triangles
+        if (off(square) > kMostStretch) continue;
+        const double cost = level_cost * cost_of_size(columns.cells, rows.cells) * cost_of_misfit(density, aspect) *
+                            (1.0 + 0.05 * off(square));
         if (best && cost >= best_cost) continue;
         best = Lattice{TileShape::make(columns.cells + 4, rows.cells + 3, levels), columns.tiles, rows.tiles,
                        extent_reaching(bounds.x1, columns.tiles), extent_reaching(bounds.z1, rows.tiles)};
         best_cost = cost;
       }
     }
-  }
+  });
   return best;
 }
 
-/// How many tiles of this shape cover the source.
-double tiles_of(const TileShape& shape, const SourceFrame& frame, const PlanRequest& request) {
-  const double extent = extent_for(shape, frame, request);
+/// Square tiles of one shape and about one extent that cover the source; all the way round a globe goes a whole number.
+Lattice square_tiles(const TileShape& shape, double extent, const SourceFrame& frame) {
   const WorldBounds bounds = frame.bounds();
-  return std::max(std::ceil(bounds.x1 / extent - 1e-9) * std::ceil(bounds.z1 / extent - 1e-9), 1.0);
+  std::int64_t columns = tiles_to_cover(bounds.x1, extent);
+  if (frame.wraps_x) {
+    columns = tiles_along(bounds.x1, extent);
+    extent = bounds.x1 / static_cast<double>(columns);
+  }
+  return {shape, columns, tiles_to_cover(bounds.z1, extent), extent, extent};
 }
 
-/// Stored samples of the whole dataset with this shape, tile overhead included.
-double cost_of(const TileShape& shape, const SourceFrame& frame, const PlanRequest& request) {
-  return tiles_of(shape, frame, request) * (static_cast<double>(shape.stored_vertex_count()) + kTileOverhead);
+/// Extents of about `wanted`: that one, and those of which a whole number ends on one of the source's edges.
+std::vector<double> extents_near(double wanted, const SourceFrame& frame) {
+  std::vector<double> found = {wanted};
+  const WorldBounds bounds = frame.bounds();
+  for (const double length : {bounds.x1, bounds.z1}) {
+    const double count = std::max(std::floor(length / wanted), 1.0);
+    for (const double tiles : {count, count + 1.0}) {
+      const double extent = extent_reaching(length, static_cast<std::int64_t>(tiles));
+      if (is_near((wanted / extent) * (wanted / extent))) found.push_back(extent);
+    }
+  }
+  return found;
 }
 
-TileShape shape_for_small_source(const SourceFrame& frame, const PlanRequest& request) {
-  const bool is_one_tile = fits_one_tile(frame, request);
-  const int most_levels = request.levels.value_or(kDefaultLevels);
-  const int fewest_levels = request.levels.value_or(1);
-  std::optional<TileShape> best;
+/// Square tiles of the shape that wastes least, of the density or spacing asked for, or about a vertex for a sample.
+Lattice square_lattice(const SourceFrame& frame, const PlanRequest& request) {
+  const bool is_one = fits_one_tile(frame, request);
+  const bool is_free = !request.density && !request.spacing && !frame.wraps_x;
+  const WorldBounds bounds = frame.bounds();
+  std::optional<Lattice> best;
   double best_cost = 0.0;
-  for (int levels = most_levels; levels >= fewest_levels; --levels) {
-    for (int cells = 1 << (levels - 1); cells <= kDefaultColumns + 48; cells += 1 << (levels - 1)) {
-      const int step = 1 << levels;
-      const int rows = static_cast<int>(std::lround(cells / kSin60 / step)) * step + 3;
-      if (!TileShape::why_invalid(cells + 4, rows, levels).empty()) continue;
-      const TileShape shape = TileShape::make(cells + 4, rows, levels);
-      if (std::abs(shape.aspect() - 1.0) > kWorstAspect) continue;
-      if (is_one_tile && tiles_of(shape, frame, request) > 1.0) continue;
-      // Every level given up must save a tenth.
-      const double cost = cost_of(shape, frame, request) * std::pow(kLevelWorth, most_levels - levels);
-      if (!best || cost < best_cost) {
-        best = shape;
+  for_each_level(request, [&](int levels, int unit, double level_cost) {
+    for (int cells = unit; cells <= static_cast<int>(kLargestSide * (kUsualColumns - 4)); cells += unit) {
+      const int cell_rows = static_cast<int>(std::lround(cells / kSin60 / (2 * unit))) * 2 * unit;
+      const double aspect = cell_rows * kSin60 / cells;
+      if (!(off(aspect) <= kWorstAspect)) continue;
+      const double wanted = wanted_extent(cells, cell_rows, frame, request);
+      for (const double extent : is_free ? extents_near(wanted, frame) : std::vector<double>{wanted}) {
+        if (bounds.x1 / extent > kMostTilesTried || bounds.z1 / extent > kMostTilesTried) continue;
+        const Lattice lattice = square_tiles(TileShape::make(cells + 4, cell_rows + 3, levels), extent, frame);
+        const auto tiles = static_cast<double>(lattice.columns * lattice.rows);
+        if (is_one && tiles > 1.0) continue;
+        const double area = lattice.extent_x * lattice.extent_z;
+        const double density = wanted * wanted / area;
+        // One tile is as large as it must be, and has no other beside it.
+        const double size = is_one ? static_cast<double>(lattice.shape.stored_vertex_count())
+                                   : tiles * area * cost_of_size(cells, cell_rows);
+        // Few tiles that go round a globe may be far from the density that is wanted.
+        const double round = is_near(density) ? 1.0 : kFarDensity;
+        const double cost = level_cost * size * cost_of_misfit(density, aspect) * round;
+        if (best && cost >= best_cost) continue;
+        best = lattice;
         best_cost = cost;
       }
     }
-  }
-  return best.value_or(TileShape::nearest(kDefaultColumns, kDefaultRows, most_levels));
+  });
+  if (best) return *best;
+  const TileShape shape = TileShape::nearest(kUsualColumns, kUsualRows, request.levels.value_or(kUsualLevels));
+  return square_tiles(shape, wanted_extent(shape.cell_columns(), shape.cell_rows(), frame, request), frame);
 }
 
-/// Square tiles of whole samples, each with two rows of triangles for a row of them: the size that wastes least.
-TileShape shape_through_samples(const SourceFrame& frame, int levels) {
+/// Tiles of whole samples, each with two rows of triangles for a row of them: the size that wastes least.
+Lattice lattice_through_samples(const SourceFrame& frame, int levels) {
   const WorldBounds bounds = frame.bounds();
   std::optional<TileShape> best;
   double best_cost = 0.0;
@@ -246,91 +264,56 @@ TileShape shape_through_samples(const SourceFrame& frame, int levels) {
     best = shape;
     best_cost = cost;
   }
-  return *best;
+  const double extent_x = best->cell_columns() * frame.spacing_x;
+  const double extent_z = best->cell_columns() * frame.spacing_z;
+  const std::int64_t rows = tiles_to_cover(bounds.z1, extent_z);
+  if (!frame.wraps_x) return {*best, tiles_to_cover(bounds.x1, extent_x), rows, extent_x, extent_z};
+  const std::int64_t columns = frame.width / best->cell_columns();
+  return {*best, columns, rows, bounds.x1 / static_cast<double>(columns), extent_z};
 }
 
-TileShape choose_shape(const SourceFrame& frame, const PlanRequest& request) {
-  const int levels = request.levels.value_or(kDefaultLevels);
-  if (request.through_samples && !request.shape && !request.budget) return shape_through_samples(frame, levels);
-  if (request.shape) return TileShape::make(request.shape->first, request.shape->second, levels);
-  if (request.budget) {
-    const std::vector<TileShape> found = candidate_shapes(request, 1);
-    if (found.empty()) {
-      refuse(fmt::format("no tile shape of {} levels lies near the budget of {}; use fewer `levels` or a larger budget",
-                         levels, request.budget->count));
-    }
-    return found.front();
-  }
-  if (!request.levels || *request.levels == kDefaultLevels) {
-    const TileShape usual = TileShape::make(kDefaultColumns, kDefaultRows, kDefaultLevels);
-    const double extent = extent_for(usual, frame, request);
-    const WorldBounds bounds = frame.bounds();
-    if (bounds.x1 / extent * (bounds.z1 / extent) >= kManyTiles) return usual;
-  }
-  return shape_for_small_source(frame, request);
-}
-
-/// Square tiles of the density, spacing or number asked for, which may reach beyond the source's edge.
-Lattice square_lattice(const SourceFrame& frame, const PlanRequest& request) {
+/// Tiles of the shape asked for; to fit, as many as end on the source's edges when they are stretched a little.
+Lattice lattice_of_shape(const TileShape& shape, const SourceFrame& frame, const PlanRequest& request) {
+  const double extent = wanted_extent(shape.cell_columns(), shape.cell_rows(), frame, request);
+  const Lattice square = square_tiles(shape, extent, frame);
+  if (!request.fit) return square;
   const WorldBounds bounds = frame.bounds();
-  const TileShape shape = choose_shape(frame, request);
-  double extent_x = extent_for(shape, frame, request);
-  double extent_z = extent_x;
-  if (request.through_samples) {
-    extent_x = shape.cell_columns() * frame.spacing_x;
-    extent_z = shape.cell_rows() * frame.spacing_z / 2.0;
-  }
-  std::int64_t columns = request.tiles ? request.tiles->first : 0;
-  std::int64_t rows = request.tiles ? request.tiles->second : 0;
-  if (frame.wraps_x && request.through_samples) {
-    columns = frame.width / shape.cell_columns();
-    rows = tiles_to_cover(bounds.z1, extent_z);
-    extent_x = bounds.x1 / static_cast<double>(columns);
-  } else if (frame.wraps_x) {
-    // A whole number of tiles goes round.
-    if (!request.tiles) columns = tiles_to_cover(std::max(bounds.x1 - extent_x / 2.0, 0.0), extent_x);
-    extent_x = bounds.x1 / static_cast<double>(columns);
-    if (!request.tiles)
-      rows = tiles_to_cover(request.fit ? std::max(bounds.z1 - extent_x / 2.0, 0.0) : bounds.z1, extent_x);
-    extent_z = request.fit ? bounds.z1 / static_cast<double>(rows) : std::max(extent_x, request.tiles ? extent_z : 0.0);
-  } else if (request.fit) {
-    if (!request.tiles) {
-      columns = tiles_to_cover(std::max(bounds.x1 - extent_x / 2.0, 0.0), extent_x);  // the nearest whole number
-      rows = tiles_to_cover(std::max(bounds.z1 - extent_z / 2.0, 0.0), extent_z);
-    }
-    extent_x = bounds.x1 / static_cast<double>(columns);
-    extent_z = bounds.z1 / static_cast<double>(rows);
-  } else if (!request.tiles) {
-    columns = tiles_to_cover(bounds.x1, extent_x);
-    rows = tiles_to_cover(bounds.z1, extent_z);
-  }
-  return {shape, columns, rows, extent_x, extent_z};
+  const std::int64_t columns = tiles_along(bounds.x1, square.extent_x);
+  const std::int64_t rows = tiles_along(bounds.z1, square.extent_z);
+  const Lattice fitted{shape, columns, rows, bounds.x1 / static_cast<double>(columns),
+                       bounds.z1 / static_cast<double>(rows)};
+  const double stretch = std::max(off(fitted.extent_x / extent), off(fitted.extent_z / extent));
+  return stretch <= kMostStretch ? fitted : square;
 }
 
-/// Fewer or more vertices than anybody asked for, and what would mend it.
-std::string density_warning(const SourceInfo& info, const Plan& plan, const PlanRequest& request) {
-  const char* const remedy = request.tiles && request.shape    ? "leave out `shape` or `tiles`"
-                             : request.tiles && request.budget ? "leave out the budget of a tile or `tiles`"
-                             : request.tiles                   ? "ask for other `tiles`"
-                             : request.fit                     ? "leave out `fit`, or ask for smaller tiles"
-                                                               : "ask for smaller tiles";
-  const char* const unit = plan.frame.in_metres ? " m" : "";
-  return fmt::format(
-      "{}: the lattice has {:.3g} vertices for one of the input's samples, with columns {:.4g}{} apart "
-      "where the input's are {:.4g}{}; {}",
-      info.path, plan.density, 2.0 * plan.grid.sigma_x(), unit, plan.frame.spacing_x, unit, remedy);
+TileShape shape_of_budget(const PlanRequest& request) {
+  const std::vector<TileShape> found = candidate_shapes(request, 1);
+  if (!found.empty()) return found.front();
+  refuse(fmt::format("no tile shape of {} levels lies near the budget of {}; use fewer `levels` or a larger budget",
+                     request.levels.value_or(kUsualLevels), request.budget->count));
+}
+
+Lattice choose_lattice(const SourceFrame& frame, const PlanRequest& request) {
+  const int levels = request.levels.value_or(kUsualLevels);
+  if (request.shape) {
+    return lattice_of_shape(TileShape::make(request.shape->first, request.shape->second, levels), frame, request);
+  }
+  if (request.budget) return lattice_of_shape(shape_of_budget(request), frame, request);
+  if (request.through_samples) return lattice_through_samples(frame, levels);
+  if (!request.fit) return square_lattice(frame, request);
+  std::optional<Lattice> fitted;
+  if (fits_one_tile(frame, request)) fitted = fitted_lattice(frame, request, true);
+  if (!fitted) fitted = fitted_lattice(frame, request, false);
+  return fitted ? *fitted : square_lattice(frame, request);
 }
 
 void check(const PlanRequest& request) {
-  require_known("outside", request.outside, Outside::kVoid);
   require_known("`wrap_x`", request.ground.wrap, Wrap::kAlways);
   require_known("`projection`", request.ground.projection.kind, ProjectionKind::kSystem);
   if (request.levels && (*request.levels < 1 || *request.levels > kMaxTileLevels)) {
     refuse(fmt::format("`levels` is {}, must be 1 to {}", *request.levels, kMaxTileLevels));
   }
-  if ((request.density ? 1 : 0) + (request.spacing ? 1 : 0) + (request.tiles ? 1 : 0) > 1) {
-    refuse("more than one of `density`, `spacing` and `tiles` is given; give one");
-  }
+  if (request.density && request.spacing) refuse("both `density` and `spacing` are given; give one");
   if (request.shape && request.budget) refuse("both a tile shape and a tile budget are given; give one");
   const auto check_positive = [](const std::optional<double>& value, const char* option) {
     if (value && !(std::isfinite(*value) && *value > 0.0))
@@ -338,9 +321,6 @@ void check(const PlanRequest& request) {
   };
   check_positive(request.density, "`density`");
   check_positive(request.spacing, "`spacing`");
-  if (request.tiles && (request.tiles->first < 1 || request.tiles->second < 1)) {
-    refuse(fmt::format("`tiles` is {}x{}, must be at least 1x1", request.tiles->first, request.tiles->second));
-  }
 }
 
 }  // namespace
@@ -354,26 +334,20 @@ Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
   }
   const SourceFrame frame = make_source_frame(info, request.ground);
   const bool is_through = can_go_through_samples(frame, request);
-  if (request.through_samples && (!is_through || request.tiles || request.density || request.spacing)) {
+  if (request.through_samples && (!is_through || request.density || request.spacing)) {
     refuse(info.path +
-           ": a lattice through the samples goes with none of `fit`, `wrap_x`, `density`, `spacing` and `tiles`, nor "
-           "with a source "
-           "that is projected; leave these out, or it");
+           ": a lattice through the samples goes with none of `fit`, `wrap_x`, `density` and `spacing`, nor with a "
+           "source that is projected; leave these out, or it");
   }
-  const bool may_fit =
-      !request.shape && !request.budget && !request.density && !request.spacing && !request.through_samples;
-  std::optional<Lattice> lattice = may_fit ? fitted_lattice(frame, request) : std::nullopt;
-  if (!lattice) lattice = square_lattice(frame, request);
-  Plan plan{
-      .frame = frame,
-      .grid = TileGrid::make(lattice->shape, lattice->columns, lattice->rows, lattice->extent_x, lattice->extent_z),
-      .outside = request.outside};
+  const Lattice lattice = choose_lattice(frame, request);
+  Plan plan{.frame = frame,
+            .grid = TileGrid::make(lattice.shape, lattice.columns, lattice.rows, lattice.extent_x, lattice.extent_z)};
   const TileShape& shape = plan.grid.shape();
   plan.density = frame.spacing_x * frame.spacing_z / (2.0 * plan.grid.sigma_x() * plan.grid.sigma_z());
   if (plan.density > kMostDensityAsked) {
     refuse(
         fmt::format("the lattice has {:.3g} vertices for one of the input's samples, at most {} are possible; use a "
-                    "larger `spacing`, a smaller `density` or fewer `tiles`",
+                    "larger `spacing` or a smaller `density`",
                     plan.density, kMostDensityAsked));
   }
   plan.lattice_samples = shape.stored_vertex_count() * plan.grid.tile_count();
@@ -384,20 +358,26 @@ Plan make_plan(const SourceInfo& info, const PlanRequest& request) {
 }
 
 bool can_go_through_samples(const SourceFrame& frame, const PlanRequest& request) {
-  const int unit = 1 << (request.levels.value_or(kDefaultLevels) - 1);
+  const int unit = 1 << (request.levels.value_or(kUsualLevels) - 1);
   return !frame.warp && !request.fit && (!frame.wraps_x || frame.width % unit == 0);
 }
 
 std::vector<Warning> plan_warnings(const SourceInfo& info, const Plan& plan, const PlanRequest& request) {
-  const bool is_odd = plan.density < kThinDensity || plan.density > kThickDensity;
-  if (request.density || request.spacing || !is_odd) return {};
-  return {density_warning(info, plan, request)};
+  constexpr double kOnTheEdge = 1e-9;
+  const WorldBounds bounds = plan.frame.bounds();
+  const bool ends_on_edge = plan.grid.world_width() <= bounds.x1 * (1.0 + kOnTheEdge) &&
+                            plan.grid.world_height() <= bounds.z1 * (1.0 + kOnTheEdge);
+  if (!request.fit || ends_on_edge) return {};
+  return {
+      fmt::format("{}: its tiles are square and reach beyond its edge; to end there they would be stretched by "
+                  "more than an eighth, in spite of `fit`{}",
+                  info.path, request.shape || request.budget ? "; ask for smaller tiles" : "")};
 }
 
 std::vector<TileShape> candidate_shapes(const PlanRequest& request, int limit) {
   const ShapeBudget budget = request.budget.value_or(ShapeBudget{ShapeBudget::Kind::kTriangles, 100000});
   for (const double tolerance : {0.1, 0.25, 0.5, 1.0}) {
-    std::vector<TileShape> found = find_shapes(request.levels.value_or(kDefaultLevels), budget, tolerance, limit);
+    std::vector<TileShape> found = find_shapes(request.levels.value_or(kUsualLevels), budget, tolerance, limit);
     if (!found.empty()) return found;
   }
   return {};

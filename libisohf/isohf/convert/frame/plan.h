@@ -15,7 +15,6 @@ namespace isohf {
 struct Plan {
   SourceFrame frame;
   TileGrid grid;
-  Outside outside = Outside::kCover;
   double density = 1.0;               ///< lattice samples for one source sample, as it came out
   std::int64_t lattice_samples = 0;   ///< C*R for all tiles
   std::uint64_t estimated_bytes = 0;  ///< of the archive, from typical bits per sample; an estimate
@@ -31,7 +30,7 @@ struct Plan {
 /// The shapes that suit a request without an input: the best by true aspect near the budget.
 [[nodiscard]] std::vector<TileShape> candidate_shapes(const PlanRequest& request, int limit);
 
-/// What a plan has that nobody asked for: a density below 0.5 or above 2. One line each, with the figure and a remedy.
+/// What a plan lacks that was asked for: tiles that end on the source's edge.
 [[nodiscard]] std::vector<Warning> plan_warnings(const SourceInfo& info, const Plan& plan, const PlanRequest& request);
 
 }  // namespace isohf

@@ -236,7 +236,7 @@ WorldBounds SourceFrame::bounds() const {
   return {0.0, 0.0, columns * spacing_x, rows * spacing_z};
 }
 
-SourceGeometry SourceFrame::geometry(Outside outside) const {
+SourceGeometry SourceFrame::geometry() const {
   SourceGeometry geometry;
   geometry.width = width;
   geometry.height = height;
@@ -245,7 +245,6 @@ SourceGeometry SourceFrame::geometry(Outside outside) const {
   geometry.first_sample_z = first_sample_z;
   geometry.spacing_x = spacing_x;
   geometry.spacing_z = spacing_z;
-  geometry.outside = outside;
   geometry.wraps_x = warp ? samples_wrap : wraps_x;
   geometry.warp = warp;
   return geometry;

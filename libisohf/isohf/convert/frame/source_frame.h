@@ -31,7 +31,7 @@ struct SourceFrame {
 
   /// The part of the world that the source covers: pixel areas, or posts; a rectangle around it where projected.
   [[nodiscard]] WorldBounds bounds() const;
-  [[nodiscard]] SourceGeometry geometry(Outside outside) const;
+  [[nodiscard]] SourceGeometry geometry() const;
 };
 
 /// Degrees become metres on the declared ellipsoid (WGS 84 where none is declared) by the projection asked for; linear

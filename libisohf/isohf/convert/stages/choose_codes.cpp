@@ -207,7 +207,7 @@ void choose_codes(Conversion& conversion, ConvertSummary& summary) {
                             found.voids));
   }
   const QuantisationRequest request = request_of(conversion, found.range);
-  if (conversion.plan.outside != Outside::kClamp) found.range = EdgeRange::widen(found.range, edge.bound());
+  found.range = EdgeRange::widen(found.range, edge.bound());
   conversion.quantisation = choose_quantisation(request, found.range, info);
   warn_of_outliers(conversion, survey, request, summary.warnings);
   conversion.range = found.range;

@@ -55,7 +55,6 @@ SourceGeometry archive_geometry(const Metadata& metadata) {
                 "its input lies on a map of its own, whose reference system has to be understood first");
   }
   SourceGeometry geometry = geometry_of(metadata);
-  geometry.outside = known(metadata.outside, "outside");
   if (const auto cut = cut_record(metadata)) geometry.coarser = static_cast<double>(cut->coarser.value_or(1));
   return geometry;
 }

@@ -179,7 +179,6 @@ ColumnTaps make_column_taps(const SourceAxis& axis, const Kernel& kernel, std::s
   for (std::size_t c = 0; c < columns; ++c) {
     const SourceAxis::Place place = axis.place(world_x[c]);
     taps.position[c] = place.position;
-    if (!place.has_elevation) taps.outside.push_back(c);
     if (!place.continued) continue;
     taps.continued.push_back(c);
     taps.edge.push_back(place.edge == 0.0 ? columns : columns + 1);
@@ -301,10 +300,6 @@ void RowSampler::sample(const SourceBand& band, double world_z, const ColumnTaps
                         std::span<float> heights) const {
   ISOHF_ASSERT(heights.size() + 2 == columns.count);
   const SourceAxis::Place place = axis_z_.place(world_z);
-  if (!place.has_elevation) {
-    std::fill(heights.begin(), heights.end(), kVoid);
-    return;
-  }
   std::vector<float>& values = scratch.values;
   sample_at(band, place.position, columns, scratch, values);
   if (place.continued) {
@@ -315,7 +310,6 @@ void RowSampler::sample(const SourceBand& band, double world_z, const ColumnTaps
     for (std::size_t c = 0; c < heights.size(); ++c) values[c] = held_within(values[c], lowest_, highest_);
   }
   for (const std::size_t c : columns.continued) values[c] = held_within(values[c], lowest_, highest_);
-  for (const std::size_t c : columns.outside) values[c] = kVoid;
   std::copy_n(values.begin(), heights.size(), heights.begin());
 }
 

@@ -21,7 +21,6 @@ struct ColumnTaps {
   std::vector<std::int32_t> start;     ///< [count] first tap's place in the line
   std::vector<float> weights;          ///< [taps][count]
   std::vector<double> position;        ///< [count] in source columns
-  std::vector<std::size_t> outside;    ///< vertices that Outside::kVoid leaves without elevation
   std::vector<std::size_t> continued;  ///< vertices beyond the source's edge whose slope goes on
   std::vector<std::size_t> edge;       ///< for each of these, the edge's place: count - 2 or count - 1
   std::int64_t first = 0;
@@ -56,8 +55,7 @@ class RowSampler {
     std::vector<float> edge_values;
   };
   /// The row of vertices at world_z. `band` holds at least what add_rows_needed and add_columns_needed ask for.
-  /// heights [columns.count - 2] out, relative to the band's datum; NaN where void: outside the source by
-  /// Outside::kVoid, or by the rules of kernels.h.
+  /// heights [columns.count - 2] out, relative to the band's datum; NaN where void, by the rules of kernels.h.
   void sample(const SourceBand& band, double world_z, const ColumnTaps& columns, Scratch& scratch,
               std::span<float> heights) const;
 

@@ -88,6 +88,58 @@ RowRange needed_between(const SourceAxis& axis, const Kernel& kernel, std::int64
   return {std::max<std::int64_t>(range.first - beyond, 0), std::min(range.last + beyond, end)};
 }
 
+constexpr float kVoidHeight = std::numeric_limits<float>::quiet_NaN();
+
+/// Which vertices beyond the source's East and South edges have an elevation: those within three lattice steps, and of
+/// each coarser level of detail, those of overviews too, its own vertices within one of its steps. So the surface ends
+/// soon, and no triangle of any level that touches the source lacks a vertex.
+///
+///        source |
+///   o   o   o   | o   o   o               three steps: triangles across the edge need one, the normals of their
+///     o   o   o |   o   o   o             vertices another, and splines on the way back to samples a third
+///   o   o   o   | o   o   o   o       o   a vertex of level 3 on every eighth row, eight steps beyond at most
+class SurfaceEnd {
+ public:
+  SurfaceEnd(const TileGrid& grid, const SourceAxis& x, const SourceAxis& z)
+      : end_x_(x.wraps() ? HUGE_VAL : x.end_world() / (2.0 * grid.sigma_x())),
+        end_z_(z.end_world() / grid.sigma_z()),
+        last_x_(grid.tile_columns() * 2 * grid.shape().cell_columns()),
+        last_z_(grid.tile_rows() * grid.shape().cell_rows()) {}
+
+  [[nodiscard]] bool holds(LatticeVertex vertex) const {
+    const double beyond =
+        std::max(static_cast<double>(vertex.x) / 2.0 - end_x_, static_cast<double>(vertex.z) - end_z_);
+    // The tiles' last vertices stand in for all those of coarser levels beyond.
+    const int level = std::min(vertex.x == last_x_ ? kMostLevels : level_of(vertex.x),
+                               vertex.z == last_z_ ? kMostLevels : level_of(vertex.z));
+    return beyond <= std::max(kSteps, std::ldexp(1.0, level)) + kTolerance;
+  }
+  /// Whether a row has a vertex that has an elevation.
+  [[nodiscard]] bool holds_row(std::int64_t z) const {
+    const int level = z == last_z_ ? kMostLevels : level_of(z);
+    return static_cast<double>(z) - end_z_ <= std::max(kSteps, std::ldexp(1.0, level)) + kTolerance;
+  }
+  /// Whether a vertex so far to the East and South, and all before it, have one.
+  [[nodiscard]] bool holds_all(LatticeVertex last) const {
+    return static_cast<double>(last.x) / 2.0 - end_x_ <= kSteps && static_cast<double>(last.z) - end_z_ <= kSteps;
+  }
+
+ private:
+  static constexpr double kSteps = 3.0;
+  static constexpr double kTolerance = 1e-6;  ///< of a step; ends are computed by products
+  static constexpr int kMostLevels = 62;
+
+  /// The coarsest level of which a vertex at such a coordinate, in half column steps or rows, may be one.
+  [[nodiscard]] static int level_of(std::int64_t at) {
+    return std::min(std::countr_zero(static_cast<std::uint64_t>(at)), kMostLevels);
+  }
+
+  double end_x_;  ///< of the source, in column steps
+  double end_z_;  ///< in rows
+  std::int64_t last_x_;
+  std::int64_t last_z_;
+};
+
 class GridResampler final : public TileResampler {
  public:
   GridResampler(const TileGrid& grid, const SourceAxis& axis_x, const SourceAxis& axis_z, const Kernel& kernel,
@@ -105,6 +157,7 @@ class GridResampler final : public TileResampler {
   SourceAxis axis_x_;
   Kernel kernel_;
   LatticeAround around_;
+  SurfaceEnd end_;
   RowSampler sampler_;
   std::vector<RowRange> rows_;     ///< that each row of tiles reads
   std::vector<RowRange> columns_;  ///< that each column of tiles reads
@@ -116,6 +169,7 @@ GridResampler::GridResampler(const TileGrid& grid, const SourceAxis& axis_x, con
       axis_x_(axis_x),
       kernel_(kernel),
       around_(around_of(grid, axis_x, axis_z, coarser)),
+      end_(grid, axis_x, axis_z),
       sampler_(axis_x, axis_z, kernel, limits, around_),
       rows_(static_cast<std::size_t>(grid.tile_rows()), RowRange::none()),
       columns_(static_cast<std::size_t>(grid.tile_columns()), RowRange::none()) {
@@ -145,19 +199,26 @@ bool GridResampler::cut(TileIndex tile, const ReadBand& read, std::span<float> h
   if (!band) return false;
   const std::array<ColumnTaps, 2> taps = {taps_of_tile(grid_, axis_x_, kernel_, tile, 0),
                                           taps_of_tile(grid_, axis_x_, kernel_, tile, 1)};
+  const GridVertex last{grid_.shape().columns() - 1, grid_.shape().rows() - 1};
+  const bool is_whole = end_.holds_all(grid_.lattice_vertex(tile, {last.column, last.row - 1})) &&
+                        end_.holds_all(grid_.lattice_vertex(tile, last));
   RowSampler::Scratch scratch;
-  for (int r = 0; r < grid_.shape().rows(); ++r) {
-    const double world_z = grid_.world_from_lattice(grid_.lattice_vertex(tile, {0, r})).z;
-    sampler_.sample(*band, world_z, taps[static_cast<std::size_t>(r & 1)], scratch,
-                    heights.subspan(static_cast<std::size_t>(r) * columns, columns));
+  for (int r = 0; r <= last.row; ++r) {
+    const LatticeVertex first = grid_.lattice_vertex(tile, {0, r});
+    const std::span<float> row = heights.subspan(static_cast<std::size_t>(r) * columns, columns);
+    if (!end_.holds_row(first.z)) {
+      std::ranges::fill(row, kVoidHeight);
+      continue;
+    }
+    sampler_.sample(*band, grid_.world_from_lattice(first).z, taps[static_cast<std::size_t>(r & 1)], scratch, row);
+    for (int c = 0; c <= last.column && !is_whole; ++c) {
+      if (!end_.holds(grid_.lattice_vertex(tile, {c, r}))) row[static_cast<std::size_t>(c)] = kVoidHeight;
+    }
   }
   return true;
 }
 
-constexpr float kVoidHeight = std::numeric_limits<float>::quiet_NaN();
-
-double reach_beyond(const SourceAxis& x, const SourceAxis& z, Outside outside) {
-  if (outside == Outside::kClamp) return HUGE_VAL;  // the edge goes on for ever
+double reach_beyond(const SourceAxis& x, const SourceAxis& z) {
   return static_cast<double>(std::max(x.continued_samples(), z.continued_samples())) + 1.0;
 }
 
@@ -231,7 +292,7 @@ class WarpedResampler final : public TileResampler {
   /// The axes are those of positions (SourceAxis::of_positions, or one that wraps with spacing 1 for x). `limits` as in
   /// GridResampler.
   WarpedResampler(const TileGrid& grid, const WarpPlace& place, const SourceAxis& axis_x, const SourceAxis& axis_z,
-                  Outside outside, const Kernel& kernel, const ElevationRange& limits, double coarser);
+                  const Kernel& kernel, const ElevationRange& limits, double coarser);
   WarpedResampler(const WarpedResampler&) = delete;
   WarpedResampler& operator=(const WarpedResampler&) = delete;
 
@@ -275,13 +336,13 @@ class WarpedResampler final : public TileResampler {
 };
 
 WarpedResampler::WarpedResampler(const TileGrid& grid, const WarpPlace& place, const SourceAxis& axis_x,
-                                 const SourceAxis& axis_z, Outside outside, const Kernel& kernel,
-                                 const ElevationRange& limits, double coarser)
+                                 const SourceAxis& axis_z, const Kernel& kernel, const ElevationRange& limits,
+                                 double coarser)
     : grid_(grid),
       axis_x_(axis_x),
       axis_z_(axis_z),
       kernel_(kernel),
-      reach_(reach_beyond(axis_x, axis_z, outside)),
+      reach_(reach_beyond(axis_x, axis_z)),
       warp_(grid, place, reach_),
       around_(around_of(grid, warp_.exact(), coarser)),
       bounds_(warp_.reading_bounds()),
@@ -460,18 +521,18 @@ SourceAxes make_axes(const TileGrid& grid, const SourceGeometry& geometry) {
   if (geometry.warp) {
     const SourcePosition continued = continued_samples(grid, *geometry.warp);
     const auto along = [&](std::int64_t samples, double steps) {
-      return SourceAxis::of_positions(samples, geometry.registration, geometry.outside, steps);
+      return SourceAxis::of_positions(samples, geometry.registration, steps);
     };
     return {geometry.wraps_x ? SourceAxis::wrapping(geometry.width, 0.0, 1.0) : along(geometry.width, continued.u),
             along(geometry.height, continued.v)};
   }
   const SourceAxis z(geometry.height, geometry.first_sample_z, geometry.spacing_z, geometry.registration,
-                     geometry.outside, kContinuedSteps * grid.sigma_z());
+                     kContinuedSteps * grid.sigma_z());
   if (geometry.wraps_x) {
     return {SourceAxis::wrapping(geometry.width, geometry.first_sample_x, geometry.spacing_x), z};
   }
   return {SourceAxis(geometry.width, geometry.first_sample_x, geometry.spacing_x, geometry.registration,
-                     geometry.outside, kContinuedSteps * 2.0 * grid.sigma_x()),
+                     kContinuedSteps * 2.0 * grid.sigma_x()),
           z};
 }
 
@@ -490,8 +551,7 @@ std::unique_ptr<TileResampler> make_tile_resampler(const TileGrid& grid, const S
                                                    const Kernel& kernel, const ElevationRange& limits) {
   const SourceAxes axes = make_axes(grid, geometry);
   if (!geometry.warp) return make_grid_resampler(grid, axes, kernel, limits, geometry.coarser);
-  return std::make_unique<WarpedResampler>(grid, *geometry.warp, axes.x, axes.z, geometry.outside, kernel, limits,
-                                           geometry.coarser);
+  return std::make_unique<WarpedResampler>(grid, *geometry.warp, axes.x, axes.z, kernel, limits, geometry.coarser);
 }
 
 }  // namespace isohf

@@ -33,8 +33,8 @@ class TileResampler {
 
   /// Returns a band that holds at least the window; nullopt: none of its samples has an elevation.
   using ReadBand = std::function<std::optional<SourceBand>(const Window&)>;
-  /// Cuts one tile. heights [C x R] out, relative to the band's datum; NaN where void: outside the source, or where less
-  /// than half of the kernel's weight, or none of the nearest samples, is valid. False, and heights are left alone, where
+  /// Cuts one tile. heights [C x R] out, relative to the band's datum; NaN where void: beyond the surface's end, or where
+  /// less than half of the kernel's weight, or none of the nearest samples, is valid. False, and heights are left alone, where
   /// the tile has no elevation.
   virtual bool cut(TileIndex tile, const ReadBand& read, std::span<float> heights) const = 0;
   /// The same from a band that holds all that the tile reads.
@@ -55,7 +55,6 @@ struct SourceGeometry {
   double first_sample_z = 0.0;
   double spacing_x = 1.0;  ///< world units between columns and rows
   double spacing_z = 1.0;
-  Outside outside = Outside::kCover;
   bool wraps_x = false;  ///< the East edge is the West edge
   /// Steps of the grid, in those of the lattice whose triangles tell which vertices lie beside a void's samples: above 1
   /// for vertices of a coarse plane, which are that lattice's.

@@ -12,7 +12,7 @@
 
 namespace isohf {
 
-/// Bounds the elevations that a surface continued beyond its source's edge can take (Outside::kCover), from the samples
+/// Bounds the elevations that a surface continued beyond its source's edge can take from the samples
 /// along that edge. Fed with all of the source; keeps `depth_rows` + 2 rows at either end.
 ///
 /// A continued elevation is 2 F(edge) - F(inside), with both values between samples of at most `depth` from the edge;

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "isohf/error.h"
-
 namespace isohf {
 namespace {
 
@@ -14,44 +12,23 @@ constexpr double kEndTolerance = 1e-6;
 
 }  // namespace
 
-std::string to_string(Outside outside) {
-  switch (outside) {
-    case Outside::kCover:
-      return "cover";
-    case Outside::kClamp:
-      return "clamp";
-    case Outside::kVoid:
-      break;
-  }
-  return "void";
-}
-
-Outside outside_from_string(const std::string& text) {
-  if (text == "cover") return Outside::kCover;
-  if (text == "clamp") return Outside::kClamp;
-  if (text == "void") return Outside::kVoid;
-  throw Error(ErrorCode::kInvalidArgument, "outside is \"" + text + "\", must be cover, clamp or void");
-}
-
 SourceAxis::SourceAxis(std::int64_t samples, double first_world, double spacing_world, Registration registration,
-                       Outside outside, double continued_world)
+                       double continued_world)
     : samples_(samples),
       first_world_(first_world),
       spacing_world_(spacing_world),
       reach_(registration == Registration::kArea ? 0.5 : 0.0),
-      outside_(outside),
       continued_(std::min(std::max(continued_world / spacing_world, reach_), static_cast<double>(samples - 1))) {}
 
 SourceAxis SourceAxis::wrapping(std::int64_t samples, double first_world, double spacing_world) {
-  SourceAxis axis(samples, first_world, spacing_world, Registration::kPoint, Outside::kClamp, 0.0);
+  SourceAxis axis(samples, first_world, spacing_world, Registration::kPoint, 0.0);
   axis.wraps_ = true;
   return axis;
 }
 
-SourceAxis SourceAxis::of_positions(std::int64_t samples, Registration registration, Outside outside,
-                                    double continued) {
-  SourceAxis axis(samples, 0.0, 1.0, registration, outside, continued);
-  axis.ends_ = outside == Outside::kCover;
+SourceAxis SourceAxis::of_positions(std::int64_t samples, Registration registration, double continued) {
+  SourceAxis axis(samples, 0.0, 1.0, registration, continued);
+  axis.ends_ = true;
   return axis;
 }
 
@@ -70,8 +47,7 @@ SourceAxis::Place SourceAxis::place(double world) const {
   if (u >= 0.0 && u <= last) return {u};
   const double edge = u < 0.0 ? 0.0 : last;
   const double beyond = std::abs(u - edge);
-  if (outside_ == Outside::kVoid && beyond > reach_ + kEndTolerance) return {edge, edge, false, false};
-  if (outside_ == Outside::kClamp || beyond <= kEndTolerance) return {edge};
+  if (beyond <= kEndTolerance) return {edge};
   if (ends_ && beyond > continued_ + kEndTolerance) return {edge, edge, false, false};
   const double inside = std::min(beyond, continued_);
   return {u < 0.0 ? inside : last - inside, edge, true, true};

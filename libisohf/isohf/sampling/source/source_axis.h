@@ -7,8 +7,8 @@
 
 namespace isohf {
 
-/// Lattice steps for which Outside::kCover continues slopes: the triangles that straddle the source's edge need one,
-/// and the normals of their vertices another.
+/// Lattice steps for which slopes go on beyond the source's edge: the triangles across the edge need one, and the normals
+/// of their vertices another.
 inline constexpr double kContinuedSteps = 2.0;
 
 /// One axis of the source: which of its samples a world coordinate falls on or between.
@@ -23,25 +23,27 @@ class SourceAxis {
     double position;    ///< in samples, within [0, n-1]; in [0, n) on an axis that wraps
     double edge = 0.0;  ///< 0 or n-1, where continued
     bool continued = false;
-    bool has_elevation = true;  ///< false where Outside leaves none
+    bool has_elevation = true;  ///< false beyond the continuation of positions
   };
 
-  /// samples >= 1; first_world, spacing_world and continued_world in world units, spacing > 0; continued_world is how
-  /// far Outside::kCover continues slopes.
-  SourceAxis(std::int64_t samples, double first_world, double spacing_world, Registration registration, Outside outside,
+  /// samples >= 1; first_world, spacing_world and continued_world in world units, spacing > 0. Slopes go on for
+  /// continued_world; beyond that the surface is level.
+  SourceAxis(std::int64_t samples, double first_world, double spacing_world, Registration registration,
              double continued_world);
 
   /// An axis that goes all the way round: the sample behind the last one is the first.
   [[nodiscard]] static SourceAxis wrapping(std::int64_t samples, double first_world, double spacing_world);
   /// An axis whose world coordinates are positions, in samples, of a source that was projected. Where the slope has
-  /// gone on for `continued` samples, Outside::kCover ends: such a source fills no rectangle of the world, and a level
-  /// plain all around it would be made up.
-  [[nodiscard]] static SourceAxis of_positions(std::int64_t samples, Registration registration, Outside outside,
-                                               double continued);
+  /// gone on for `continued` samples, the surface ends.
+  [[nodiscard]] static SourceAxis of_positions(std::int64_t samples, Registration registration, double continued);
 
   [[nodiscard]] std::int64_t samples() const { return samples_; }
   [[nodiscard]] double spacing_world() const { return spacing_world_; }
   [[nodiscard]] bool wraps() const { return wraps_; }
+  /// Where the covered ground ends: at the last post, or half a pixel beyond the last sample.
+  [[nodiscard]] double end_world() const {
+    return first_world_ + (static_cast<double>(samples_ - 1) + reach_) * spacing_world_;
+  }
   /// The sample that stands in for sample k, any k: mirrored at the ends (mirror_index), or counted round.
   [[nodiscard]] std::int64_t index(std::int64_t k) const {
     if (k >= 0 && k < samples_) return k;
@@ -56,16 +58,14 @@ class SourceAxis {
   /// Whole samples inside the edge that a continued place may read.
   [[nodiscard]] std::int64_t continued_samples() const;
 
-  /// Pure function of the coordinate. Half a pixel around an area-registered source is covered ground: clamped where
-  /// Outside::kClamp asks for it, else continued.
+  /// Pure function of the coordinate. Half a pixel around an area-registered source is covered ground: the slope goes on.
   [[nodiscard]] Place place(double world) const;
 
  private:
   std::int64_t samples_;
   double first_world_;
   double spacing_world_;
-  double reach_;  ///< how far the covered ground goes beyond the first and last samples, in samples
-  Outside outside_;
+  double reach_;      ///< how far the covered ground goes beyond the first and last samples, in samples
   double continued_;  ///< in samples
   bool wraps_ = false;
   bool ends_ = false;  ///< nothing lies beyond the continuation

@@ -385,16 +385,14 @@ class Comparison {
                       AccuracyReport& counts) const {
     ++(void_in_source ? counts.samples_invented : counts.samples_lost);
     if (!void_in_source && is_on_outline(column, row)) return;
-    const bool edge_is_void = archive_.metadata().outside == Outside::kVoid;
     // A void may be on a triangle whose corners lie beside samples, each as far from one again.
     const std::int64_t reach =
         std::min((void_in_source ? 2 : 1) * reach_at(column, row), warp_ ? kMostReach : 2 * reach_);
     for (std::int64_t r = row - reach; r <= row + reach; ++r) {
       for (std::int64_t c = column - reach; c <= column + reach; ++c) {
         const bool inside = c >= 0 && r >= 0 && c < info_.width && r < info_.height;
-        if (!inside && !edge_is_void) continue;
-        const bool is_void = !inside || std::isnan(band.view().heights(c - band.window.column, r - band.window.row));
-        if (is_void != void_in_source) return;
+        if (inside && std::isnan(band.view().heights(c - band.window.column, r - band.window.row)) != void_in_source)
+          return;
       }
     }
     ++(void_in_source ? counts.invented_inside : counts.lost_inside);
