@@ -84,12 +84,13 @@ for name, unit, length in (("deg_m", "m", 1.0), ("deg_ft", "ft", FOOT)):
     off = sum(abs(here[7] - there[7]) > 0.05 for here, there in zip(found, lines("m.isohf", places, *shadow)))
     check(off < len(places) // 100, f"{name}, laid out in degrees: {off} of {len(places)} places are lit differently")
 
-# Pictures are the same to rounding, whatever the exaggeration.
+# Pictures are the same to rounding, whatever the exaggeration, but for pixels whose triangle turns its edge to the sun: the
+# last bit of a height decides whether it is dark.
 for kind in ((), ("--kind", "hillshade",), ("--kind", "hillshade", "--exaggeration", "3"), ("--kind", "shadow-mask",)):
     pictures = []
     for name in ("m", "ft", "usft"):
         isohf("shade", f"{name}.isohf", f"{name}.png", "--overwrite", "--size", "96", *kind)
         pictures.append(read_png(f"{name}.png")[3])
     for other in pictures[1:]:
-        worst = max(abs(a - b) for a, b in zip(pictures[0], other))
-        check(worst <= 2, f"shade {' '.join(kind)}: pixels of heights in feet are {worst} of 255 off")
+        off = sum(abs(a - b) > 2 for a, b in zip(pictures[0], other))
+        check(off <= len(other) // 1000, f"shade {' '.join(kind)}: {off} of {len(other)} values of heights in feet are off")

@@ -247,11 +247,10 @@ void Soak::hold_against_oracle(const ArchiveReader& archive, HeightSource& sourc
 }
 
 std::string described(const SourceInfo& info, const ConvertOptions& options) {
-  std::string text =
-      fmt::format("{} x {} {}, {}, {}, filter {}, {}, outside {}, type {}, level {}", info.width, info.height,
-                  to_string(info.sample_type), to_string(info.georeference.registration), info.georeference.spacing_x,
-                  to_string(*options.filter), to_string(options.acquisition), to_string(options.plan.outside),
-                  to_string(options.code_type), level_of(options.effort));
+  std::string text = fmt::format(
+      "{} x {} {}, {}, {}, filter {}, {}, type {}, level {}", info.width, info.height, to_string(info.sample_type),
+      to_string(info.georeference.registration), info.georeference.spacing_x, to_string(*options.filter),
+      to_string(options.acquisition), to_string(options.code_type), level_of(options.effort));
   if (options.z_range) text += fmt::format(", z_range {}:{}", options.z_range->first, options.z_range->second);
   if (options.step) text += fmt::format(", step {}", *options.step);
   return text;
