@@ -215,8 +215,9 @@ class Estimate {
     const std::int64_t held = std::min(rows_in_use(memory), in_flight * (tile_rows_ + 2 * halo_ + 2 * rows.step.rows));
     const double pinned = static_cast<double>(columns * held) * static_cast<double>(size_bytes(info_.sample_type));
     const double all = static_cast<double>(info_.height) * static_cast<double>(row_bytes());
+    // A read, the cells that it becomes, and the memory of as many that were dropped, on either side of a tile.
     return std::min(std::max(pinned, static_cast<double>(rows.most_bytes)), all) +
-           2.0 * static_cast<double>(rows.step.most_bytes(info_));
+           4.0 * static_cast<double>(rows.step.most_bytes(info_));
   }
 
   /// What tiles are cut from: heights, coefficients and voids, in each thread; one of a joined globe may have whole rows.
