@@ -60,6 +60,10 @@ class VertexCheck {
   VertexReport run(const Job& job) {
     const auto cutter = make_tile_resampler(grid_, archive_geometry(metadata_), kernel_,
                                             {limits_.lowest - datum_, limits_.highest - datum_});
+    // Slopes beyond the source are held within the range that was asked for, or, if all elevations were moved into it, not.
+    const auto free = metadata_.z_range
+                          ? make_tile_resampler(grid_, archive_geometry(metadata_), kernel_, {-HUGE_VAL, HUGE_VAL})
+                          : nullptr;
     HeightRows rows(source_, datum_, archive_geometry(metadata_).wraps_x, choose_memory(job));
     std::vector<VertexReport> tiles(static_cast<std::size_t>(grid_.tile_columns()));
     for (std::int64_t row = 0; row < grid_.tile_rows(); ++row) {
@@ -67,7 +71,9 @@ class VertexCheck {
       rows.drop_before(rows.with_halo({0, needed.first, 1, 1}, prefilter_).row);
       oneapi::tbb::parallel_for(std::int64_t{0}, grid_.tile_columns(), [&](std::int64_t column) {
         job.throw_if_cancelled();
-        tiles[static_cast<std::size_t>(column)] = check_tile(*cutter, rows, {column, row});
+        VertexReport& tile = tiles[static_cast<std::size_t>(column)];
+        tile = check_tile(*cutter, rows, {column, row});
+        if (tile.wrong > 0 && free) tile = check_tile(*free, rows, {column, row});
       });
       for (const VertexReport& tile : tiles) add(tile);
       job.report({"resample", "rows", row + 1, grid_.tile_rows()});

@@ -221,7 +221,7 @@ TEST_F(ExportCommand, SpreadsElevationsOverTheRangeAskedFor) {
   EXPECT_THAT(too_small, HasSubstr(" (elevation 265."));
   EXPECT_THAT(too_small,
               HasSubstr("), which uint16 does not hold; use --raw-scale 0.0262 --raw-offset -858.5216, --clamp-range, "
-                        "--method barycentric or another --type (elevations are -1 to 855.5)"));
+                        "--method barycentric or another --type (elevations are -1 to 855)"));
   // That holds all, with the sea where it was.
   EXPECT_EQ(exported({folder_ / "d.r16", "--raw-scale", "0.0262", "--raw-offset", "-858.5216"}).at("clamped"), 0);
   std::filesystem::remove(folder_ / "d.r16");
