@@ -61,7 +61,7 @@ some = every[::5]
 # Posts of degrees, whose tiles end on them; posts and areas of a map, offsets that are no binary fractions.
 tile = write_tiff("degrees.tif", 241, 241, hills, west=6.0, north=45.0, spacing=1.0 / 240.0, epsg=4326, point=True)
 check(cuts_hold(tile, "posts in degrees", every, "--shape", "44x67", "--fit") > 10, "no post lies on an edge of tiles")
-posts = write_tiff("posts.tif", 181, 121, hills, west=300000.1, north=5100000.7, spacing=30.1, epsg=32632, point=True)
+posts = write_tiff("posts.tif", 161, 111, hills, west=300000.1, north=5100000.7, spacing=30.1, epsg=32632, point=True)
 check(cuts_hold(posts, "posts in metres", some, "--shape", "44x67", "--fit") > 10, "no post lies on an edge of tiles")
 areas = write_tiff("areas.tif", 210, 150, hills, west=300000.1, north=5100000.7, spacing=29.7, epsg=32632)
 cuts_hold(areas, "areas in metres", some, "--shape", "44x67", "--fit")
@@ -73,7 +73,7 @@ names = [write_hgt(f"N44E00{n}.hgt", height=lambda column, row: 800 + column // 
 for sources in (names, [real("N44E006.hgt"), real("N44E007.hgt")]):
     if sources[0] is None:
         continue
-    isohf("convert", *sources, "-o", "a.isohf", "--overwrite", "-q")
+    isohf("convert", *sources, "-o", "a.isohf", "--overwrite", "-q", "--fit")
     isohf("extract", "a.isohf", "-o", "e.isohf", "--overwrite", "-q", "--bbox", "6.5,44.2,6.8,44.4")
     said = isohf("export", "e.isohf", "e.tif", "--overwrite", "--json").json()
     check((said["width"], said["voids"], said["sample_type"]) == (533, 0, "int16"), f"an extract: {said}")
