@@ -84,8 +84,8 @@ for name, unit, length in (("deg_m", "m", 1.0), ("deg_ft", "ft", FOOT)):
     off = sum(abs(here[7] - there[7]) > 0.05 for here, there in zip(found, lines("m.isohf", places, *shadow)))
     check(off < len(places) // 100, f"{name}, laid out in degrees: {off} of {len(places)} places are lit differently")
 
-# Pictures are the same to rounding, whatever the exaggeration, but for pixels whose triangle turns its edge to the sun: the
-# last bit of a height decides whether it is dark.
+# Pictures are the same to rounding, whatever the exaggeration. The last bit of a height decides whether a triangle that turns
+# its edge to the sun is dark: those pixels differ, but in hillshades, which have no shadows.
 for kind in ((), ("--kind", "hillshade",), ("--kind", "hillshade", "--exaggeration", "3"), ("--kind", "shadow-mask",)):
     pictures = []
     for name in ("m", "ft", "usft"):
@@ -93,4 +93,5 @@ for kind in ((), ("--kind", "hillshade",), ("--kind", "hillshade", "--exaggerati
         pictures.append(read_png(f"{name}.png")[3])
     for other in pictures[1:]:
         off = sum(abs(a - b) > 2 for a, b in zip(pictures[0], other))
-        check(off <= len(other) // 1000, f"shade {' '.join(kind)}: {off} of {len(other)} values of heights in feet are off")
+        most = 0 if "hillshade" in kind else len(other) // 1000
+        check(off <= most, f"shade {' '.join(kind)}: {off} of {len(other)} values of heights in feet are off")

@@ -57,7 +57,7 @@ def check(condition, message):
 
 
 def near(found, expected, tolerance, what):
-    check(abs(found - expected) <= tolerance or found != found and expected != expected, f"{what}: found {found}, must be {expected} to within {tolerance}")
+    check(abs(found - expected) <= tolerance, f"{what}: found {found}, must be {expected} to within {tolerance}")
 
 
 def isohf(*arguments, code=0, stdin="", limit_kb=None, environment=None, timeout=300):
