@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <utility>
+#include <algorithm>
+#include <array>
+#include <string_view>
 
 #include "formats/io/raw_file.h"
 #include "formats/mesh/mesh_sinks.h"
@@ -13,59 +15,51 @@ namespace {
 
 using Create = std::unique_ptr<MeshSink> (*)(const std::string& path, const MeshSpec& spec);
 
-constexpr std::pair<const char*, Create> kFormats[] = {
-    {".glb", create_glb}, {".obj", create_obj}, {".ply", create_ply}};
-
-/// Names the file in what goes wrong.
-class NamedSink final : public MeshSink {
- public:
-  NamedSink(std::string path, std::unique_ptr<MeshSink> sink) : path_(std::move(path)), sink_(std::move(sink)) {}
-  void write(const MeshPiece& piece, std::span<const std::byte> picture) override {
-    try {
-      sink_->write(piece, picture);
-    } catch (const Error& error) {
-      throw error.within(path_);
-    }
-    count(piece);
-  }
-  void finish() override {
-    try {
-      sink_->finish();
-    } catch (const Error& error) {
-      throw error.within(path_);
-    }
-  }
-
- private:
-  std::string path_;
-  std::unique_ptr<MeshSink> sink_;
+struct MeshFormat {
+  const char* extension;
+  Create create;
+  std::array<std::string_view, 4> begins;  ///< how its files begin
 };
+
+constexpr MeshFormat kFormats[] = {{".glb", create_glb, {"glTF"}},
+                                   {".obj", create_obj, {"# ", "v ", "o ", "mtll"}},
+                                   {".ply", create_ply, {"ply\n", "ply\r"}}};
+
+const MeshFormat* format_of(const std::string& path) {
+  const std::string extension = extension_of(path);
+  for (const MeshFormat& format : kFormats) {
+    if (extension == format.extension) return &format;
+  }
+  return nullptr;
+}
 
 }  // namespace
 
 bool is_mesh_name(const std::string& path) {
-  const std::string extension = extension_of(path);
-  for (const auto& [known, create] : kFormats) {
-    if (extension == known) return true;
-  }
-  return false;
+  return format_of(path) != nullptr;
 }
 
 bool is_textured_mesh_name(const std::string& path) {
   return extension_of(path) == ".glb";
 }
 
+bool begins_as_mesh(const std::string& path, std::string_view head) {
+  const MeshFormat* const format = format_of(path);
+  return format != nullptr && std::ranges::any_of(format->begins, [&](std::string_view begin) {
+           return !begin.empty() && head.starts_with(begin);
+         });
+}
+
 std::unique_ptr<MeshSink> create_mesh(const std::string& path, const MeshSpec& spec) {
-  const std::string extension = extension_of(path);
-  for (const auto& [known, create] : kFormats) {
-    if (extension != known) continue;
-    try {
-      return std::make_unique<NamedSink>(path, create(path, spec));
-    } catch (const Error& error) {
-      throw error.within(path);
-    }
+  const MeshFormat* const format = format_of(path);
+  if (format == nullptr) {
+    throw Error(ErrorCode::kInvalidArgument, path + ": the name of a mesh ends in .glb, .obj or .ply");
   }
-  throw Error(ErrorCode::kInvalidArgument, path + ": the name of a mesh ends in .glb, .obj or .ply");
+  try {
+    return format->create(path, spec);
+  } catch (const Error& error) {
+    throw error.within(path);
+  }
 }
 
 std::vector<std::string> header_lines(const MeshSpec& spec) {

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "formats/mesh/mesh_sink.h"
 
@@ -12,6 +13,9 @@ namespace isohf {
 
 /// If the format of that name also holds pictures: .glb.
 [[nodiscard]] bool is_textured_mesh_name(const std::string& path);
+
+/// If a file that begins with `head`, 4 bytes of it, is a mesh of the format that the name states.
+[[nodiscard]] bool begins_as_mesh(const std::string& path, std::string_view head);
 
 /// Begins a mesh file whose format follows from the extension of `path`.
 ///   .glb  glTF 2.0: x East, y up, z South; a mesh for each tile, with texture coordinates and pictures

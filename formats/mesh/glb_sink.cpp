@@ -43,7 +43,8 @@ std::size_t padded(std::size_t bytes) {
 class GlbSink final : public MeshSink {
  public:
   GlbSink(const std::string& path, const MeshSpec& spec)
-      : spec_(spec),
+      : MeshSink(path),
+        spec_(spec),
         text_room_(kTextBytes + kTextBytesOfPiece * static_cast<std::uint64_t>(spec.pieces)),
         file_(path, {.overwrite = spec.overwrite}) {
     if (text_room_ > std::numeric_limits<std::uint32_t>::max() / 2) refuse();
@@ -53,8 +54,7 @@ class GlbSink final : public MeshSink {
     materials_.push_back(material());
   }
 
-  void write(const MeshPiece& piece, std::span<const std::byte> picture) override {
-    count(piece);
+  void add(const MeshPiece& piece, std::span<const std::byte> picture) override {
     const std::size_t vertices = add_view(vertex_bytes(piece), kArrayBuffer, kVertexBytes);
     const bool is_wide = piece.vertices.size() > std::numeric_limits<std::uint16_t>::max();
     const std::size_t indices = add_view(
@@ -94,7 +94,7 @@ class GlbSink final : public MeshSink {
                       {"translation", ordered_json::array({piece.corner.x, 0.0, piece.corner.z})}});
   }
 
-  void finish() override {
+  void complete() override {
     if (meshes_.empty()) throw Error(ErrorCode::kInvalidArgument, "there is no triangle to write: all of it is nodata");
     const std::uint64_t end = file_.position();
     if (end > std::numeric_limits<std::uint32_t>::max()) refuse();

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "isohf/mesh.h"
 #include "isohf/projection.h"
@@ -28,27 +28,26 @@ struct MeshSpec {
 /// leaves nothing behind. One thread calls. Memory: some kilobytes for each piece.
 class MeshSink {
  public:
-  MeshSink() = default;
+  explicit MeshSink(std::string path) : path_(std::move(path)) {}
   MeshSink(const MeshSink&) = delete;
   MeshSink& operator=(const MeshSink&) = delete;
   virtual ~MeshSink() = default;
 
   /// picture  the piece's texture as a PNG or JPEG file; empty: none
   /// Throws Error naming the path: kIo, kInvalidArgument (more than the format holds).
-  virtual void write(const MeshPiece& piece, std::span<const std::byte> picture) = 0;
-  /// Completes the file and gives it its name. Throws Error{kIo}.
-  virtual void finish() = 0;
+  void write(const MeshPiece& piece, std::span<const std::byte> picture);
+  /// Completes the file and gives it its name. Throws Error naming the path: kIo, kInvalidArgument (no triangle).
+  void finish();
 
-  [[nodiscard]] std::int64_t vertices() const { return vertices_; }
-  [[nodiscard]] std::int64_t triangles() const { return triangles_; }
-
- protected:
-  void count(const MeshPiece& piece) {
-    vertices_ += static_cast<std::int64_t>(piece.vertices.size());
-    triangles_ += static_cast<std::int64_t>(piece.indices.size() / 3);
-  }
+  [[nodiscard]] std::int64_t vertices() const { return vertices_; }    ///< written so far
+  [[nodiscard]] std::int64_t triangles() const { return triangles_; }  ///< written so far
 
  private:
+  /// The same of a format; errors do not name the path. vertices() and triangles() are those before the piece.
+  virtual void add(const MeshPiece& piece, std::span<const std::byte> picture) = 0;
+  virtual void complete() = 0;
+
+  std::string path_;
   std::int64_t vertices_ = 0;
   std::int64_t triangles_ = 0;
 };

@@ -11,12 +11,13 @@ namespace {
 /// Vertices count from 1 through the whole file.
 class ObjSink final : public MeshSink {
  public:
-  ObjSink(const std::string& path, const MeshSpec& spec) : file_(path, {.overwrite = spec.overwrite}) {
+  ObjSink(const std::string& path, const MeshSpec& spec) : MeshSink(path), file_(path, {.overwrite = spec.overwrite}) {
     for (const std::string& line : header_lines(spec)) file_.append("# " + line + "\n");
     file_.append("# x East, y up, z South\n");
   }
 
-  void write(const MeshPiece& piece, std::span<const std::byte>) override {
+  void add(const MeshPiece& piece, std::span<const std::byte>) override {
+    const std::int64_t first = vertices() + 1;
     fmt::memory_buffer text;
     const auto out = std::back_inserter(text);
     fmt::format_to(out, "o tile_{}_{}\n", piece.tile.column, piece.tile.row);
@@ -30,19 +31,16 @@ class ObjSink final : public MeshSink {
     for (std::size_t i = 0; i < piece.indices.size(); i += 3) {
       text.push_back('f');
       for (std::size_t k = i; k < i + 3; ++k) {
-        fmt::format_to(out, " {0}/{0}/{0}", first_ + piece.indices[k]);
+        fmt::format_to(out, " {0}/{0}/{0}", first + piece.indices[k]);
       }
       text.push_back('\n');
     }
     file_.append(std::string_view(text.data(), text.size()));
-    first_ += piece.vertices.size();
-    count(piece);
   }
-  void finish() override { file_.commit(); }
+  void complete() override { file_.commit(); }
 
  private:
   OutputFile file_;
-  std::uint64_t first_ = 1;
 };
 
 }  // namespace

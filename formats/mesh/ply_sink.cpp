@@ -16,19 +16,21 @@ constexpr std::size_t kPlyVertexBytes = 24;
 constexpr std::size_t kPlyFaceBytes = 13;
 constexpr std::size_t kCopiedBytes = std::size_t{1} << 20U;
 
-/// Vertices stand before faces: faces go to a file of their own first, which finish() appends. The counts in the header
+/// Vertices stand before faces: faces go to a file of their own first, which complete() appends. The counts in the header
 /// have a fixed width and are filled in at the end.
 class PlySink final : public MeshSink {
  public:
   PlySink(const std::string& path, const MeshSpec& spec)
-      : spec_(spec), file_(path, {.overwrite = spec.overwrite}), faces_(path + ".faces", {.overwrite = true}) {
+      : MeshSink(path),
+        spec_(spec),
+        file_(path, {.overwrite = spec.overwrite}),
+        faces_(path + ".faces", {.overwrite = true}) {
     file_.append(header());
   }
 
-  void write(const MeshPiece& piece, std::span<const std::byte>) override {
+  void add(const MeshPiece& piece, std::span<const std::byte>) override {
     const std::int64_t first = vertices();
-    count(piece);
-    if (vertices() > std::numeric_limits<std::int32_t>::max()) {
+    if (first + static_cast<std::int64_t>(piece.vertices.size()) > std::numeric_limits<std::int32_t>::max()) {
       throw Error(ErrorCode::kInvalidArgument,
                   "a PLY file holds at most 2147483647 vertices; use `level` or `max_triangles`, or write .glb");
     }
@@ -56,7 +58,7 @@ class PlySink final : public MeshSink {
     faces_.append(bytes);
   }
 
-  void finish() override {
+  void complete() override {
     faces_.flush();
     std::vector<std::byte> part(kCopiedBytes);
     for (std::uint64_t at = 0; at < faces_.position();) {

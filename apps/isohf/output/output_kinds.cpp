@@ -1,6 +1,6 @@
 #include "output/output_kinds.h"
 
-#include "formats/io/raw_file.h"
+#include "formats/mesh/create_mesh.h"
 #include "formats/registry.h"
 #include "formats/write/encoders.h"
 #include "formats/write/raster_sink.h"
@@ -50,13 +50,8 @@ void check_raster_output(const std::vector<std::string>& inputs, const std::stri
 void check_mesh_output(const std::vector<std::string>& inputs, const std::string& output, bool overwrite) {
   check_output_file(inputs, output, overwrite, [&](const std::string& place) {
     const std::vector<std::byte> head = head_of_file(place, 4);
-    const std::string begins(reinterpret_cast<const char*>(head.data()), head.size());
-    const std::string extension = extension_of(output);
-    const bool is_own = extension == ".glb"   ? begins == "glTF"
-                        : extension == ".ply" ? begins == "ply\n" || begins == "ply\r"
-                                              : begins.starts_with("# ") || begins.starts_with("v ") ||
-                                                    begins.starts_with("o ") || begins.starts_with("mtll");
-    if (begins.empty() || is_own) return;
+    const std::string_view begins(reinterpret_cast<const char*>(head.data()), head.size());
+    if (begins.empty() || begins_as_mesh(output, begins)) return;
     throw Error(ErrorCode::kInvalidArgument, {"", "exists and is " + kind_of(place), "",
                                               "a mesh replaces only meshes of its format, choose another name"});
   });

@@ -24,6 +24,9 @@ struct Metadata;
 /// The four sides of a tile.
 enum class TileSide { kWest, kEast, kNorth, kSouth };
 
+/// Whether a list of triangles has those that join a tile to neighbours at other levels.
+enum class Stitches { kIncluded, kLeftOut };
+
 /// The index arrays that all tiles of one shape share. An index is column + row * C of a stored vertex. All triangles
 /// wind counter-clockwise seen from above.
 ///
@@ -54,7 +57,8 @@ class TileMesh {
   /// What strip() and stitch() draw as a triangle list, without the triangles that repeat a vertex.
   /// elevations  [C x R], leaves out triangles with a NaN at a vertex; empty: keeps all
   /// Throws Error{kInvalidArgument} if the number of elevations is neither 0 nor C*R.
-  [[nodiscard]] std::vector<std::uint32_t> triangles(int level, std::span<const double> elevations = {}) const;
+  [[nodiscard]] std::vector<std::uint32_t> triangles(int level, std::span<const double> elevations = {},
+                                                     Stitches stitches = Stitches::kIncluded) const;
 
  private:
   struct Part {

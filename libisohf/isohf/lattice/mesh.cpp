@@ -58,7 +58,7 @@ std::span<const std::uint32_t> TileMesh::part(const std::vector<Part>& parts, in
   return std::span(indices_).subspan(part.first, part.count);
 }
 
-std::vector<std::uint32_t> TileMesh::triangles(int level, std::span<const double> elevations) const {
+std::vector<std::uint32_t> TileMesh::triangles(int level, std::span<const double> elevations, Stitches stitches) const {
   if (!elevations.empty() && static_cast<std::int64_t>(elevations.size()) != shape_.stored_vertex_count()) {
     throw Error(ErrorCode::kInvalidArgument,
                 fmt::format("{} elevations for tiles of {} vertices", elevations.size(), shape_.stored_vertex_count()));
@@ -71,7 +71,7 @@ std::vector<std::uint32_t> TileMesh::triangles(int level, std::span<const double
     list.insert(list.end(), triangle.begin(), triangle.end());
   };
   const std::span<const std::uint32_t> strip = this->strip(level);
-  const std::span<const std::uint32_t> stitch = this->stitch(level);
+  const auto stitch = stitches == Stitches::kIncluded ? this->stitch(level) : std::span<const std::uint32_t>();
   list.reserve(static_cast<std::size_t>(3 * shape_.strip_triangle_count(level)) + stitch.size());
   // Every second triangle of a strip takes its first two vertices in the other order.
   for (std::size_t i = 0; i + 2 < strip.size(); ++i) add({strip[i + i % 2], strip[i + 1 - i % 2], strip[i + 2]});

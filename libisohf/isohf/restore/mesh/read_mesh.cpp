@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -31,8 +30,9 @@ class PieceMaker {
     const WorldPoint corner = grid_.world_from_object(tile, {0.0, 0.0});
     piece.corner = {corner.x - plan_.corner.x, corner.z - plan_.corner.z};
     const std::vector<double> elevations = archive_.read_elevations(tile, plan_.plane);
-    piece.indices = mesh_.triangles(plan_.level_of(tile), elevations);
-    if (plan_.levels.empty()) piece.indices.resize(without_stitches(piece.indices, elevations));
+    // Tiles of one level meet as they are.
+    piece.indices = mesh_.triangles(plan_.level_of(tile), elevations,
+                                    plan_.levels.empty() ? Stitches::kLeftOut : Stitches::kIncluded);
     const auto vertices =
         tile_vertices(archive_.metadata(), tile, elevations, {corner, plan_.elevation_scale}, plan_.plane);
     if (plan_.plane > 0) drop_flat(vertices, piece.indices);
@@ -41,20 +41,6 @@ class PieceMaker {
   }
 
  private:
-  /// Tiles of one level meet without stitches, which stand at the end of the list.
-  [[nodiscard]] std::size_t without_stitches(const std::vector<std::uint32_t>& indices,
-                                             std::span<const double> elevations) const {
-    const std::span<const std::uint32_t> stitch = mesh_.stitch(plan_.level);
-    std::size_t kept = indices.size();
-    for (std::size_t i = 0; i < stitch.size(); i += 3) {
-      const bool is_drawn = std::none_of(stitch.begin() + static_cast<std::ptrdiff_t>(i),
-                                         stitch.begin() + static_cast<std::ptrdiff_t>(i) + 3,
-                                         [&](std::uint32_t v) { return std::isnan(elevations[v]); });
-      if (is_drawn) kept -= 3;
-    }
-    return kept;
-  }
-
   /// Triangles of an overview beyond the heightfield, whose vertices are moved to its edge, have no area.
   static void drop_flat(const std::vector<MeshVertex>& vertices, std::vector<std::uint32_t>& indices) {
     std::vector<std::uint32_t> kept;
